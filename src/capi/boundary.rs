@@ -1,0 +1,79 @@
+//! The one place where panics stop and pointers from C become references.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use super::status::IINE_OK;
+use crate::Error;
+
+/// Runs the body of an exported function: no panic leaves it, and its outcome becomes a status.
+pub(super) fn guard(body: impl FnOnce() -> Result<(), Error>) -> i32 {
+    match catch_unwind(AssertUnwindSafe(body)) {
+        Ok(Ok(())) => IINE_OK,
+        Ok(Err(error)) => error as i32,
+        Err(_) => Error::Internal as i32,
+    }
+}
+
+/// # Safety
+/// `pointer` is NULL or valid for reads for `'a`, and nobody writes to it meanwhile.
+pub(super) unsafe fn reference<'a, T>(pointer: *const T) -> Result<&'a T, Error> {
+    check_aligned(pointer)?;
+    // SAFETY: promised by the caller; NULL and misaligned pointers were refused.
+    unsafe { pointer.as_ref() }.ok_or(Error::NullPointer)
+}
+
+/// # Safety
+/// `pointer` is NULL or valid for reads and writes for `'a`, and nobody else uses it meanwhile.
+pub(super) unsafe fn reference_mut<'a, T>(pointer: *mut T) -> Result<&'a mut T, Error> {
+    check_aligned(pointer)?;
+    // SAFETY: promised by the caller; NULL and misaligned pointers were refused.
+    unsafe { pointer.as_mut() }.ok_or(Error::NullPointer)
+}
+
+/// # Safety
+/// `pointer` is NULL or valid for one write.
+pub(super) unsafe fn write<T>(pointer: *mut T, value: T) -> Result<(), Error> {
+    check_writable(pointer)?;
+    // SAFETY: promised by the caller; NULL and misaligned pointers were refused.
+    unsafe { pointer.write(value) };
+    Ok(())
+}
+
+/// Refuses a place that [`write`] would refuse, before the work is done.
+pub(super) fn check_writable<T>(pointer: *mut T) -> Result<(), Error> {
+    if pointer.is_null() {
+        return Err(Error::NullPointer);
+    }
+    check_aligned(pointer)
+}
+
+fn check_aligned<T>(pointer: *const T) -> Result<(), Error> {
+    if pointer.is_aligned() { Ok(()) } else { Err(Error::Misaligned) }
+}
+
+/// Reads a struct whose first field is its size in the caller's version of the header; fields that the caller
+/// does not know of read as zero.
+///
+/// # Safety
+/// `pointer` is NULL, or points to a `usize` followed by as many bytes as that number, itself included, says.
+pub(super) unsafe fn read_sized<T: Sized + Copy>(
+    pointer: *const T,
+    sizes: &[usize],
+) -> Result<T, Error> {
+    if pointer.is_null() {
+        return Err(Error::NullPointer);
+    }
+    check_aligned(pointer)?;
+    // SAFETY: the struct starts with its size, and the pointer is neither NULL nor misaligned.
+    let size = unsafe { pointer.cast::<usize>().read() };
+    if !sizes.contains(&size) {
+        return Err(Error::StructSize);
+    }
+    let mut value = std::mem::MaybeUninit::<T>::zeroed();
+    // SAFETY: `size` bytes are readable as the caller promises, and not more than `T` has as `sizes` says; all
+    // structs read here consist of integers and pointers, for which zero bits are a value.
+    unsafe {
+        std::ptr::copy_nonoverlapping(pointer.cast::<u8>(), value.as_mut_ptr().cast::<u8>(), size);
+        Ok(value.assume_init())
+    }
+}

@@ -1,0 +1,383 @@
+//! The estimator handle.
+
+use super::boundary::{check_writable, guard, read_sized, reference, reference_mut, write};
+use super::types::{iine_maps, iine_normals, iine_points};
+use crate::{BorderPolicy, Error, Estimator, Maps, Method, Normals, Options, Points};
+
+/// Estimates normals. Owns its options and its scratch memory, which is reused from frame to frame.
+///
+/// One estimator is used by one thread at a time; different estimators freely.
+#[allow(non_camel_case_types)]
+pub struct iine_estimator {
+    estimator: Estimator,
+}
+
+/// Makes an estimator with the default options and writes it to `*estimator`.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_MISALIGNED.
+///
+/// # Safety
+/// `estimator` is NULL or valid for a write.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_new(estimator: *mut *mut iine_estimator) -> i32 {
+    guard(|| {
+        check_writable(estimator)?;
+        let new = Box::new(iine_estimator { estimator: Estimator::new(Options::default()) });
+        // SAFETY: promised by the caller.
+        unsafe { write(estimator, Box::into_raw(new)) }
+    })
+}
+
+/// Frees an estimator. NULL is fine.
+///
+/// # Safety
+/// `estimator` is NULL, or came from `iine_estimator_new` and was not freed.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_free(estimator: *mut iine_estimator) {
+    guard(|| {
+        if !estimator.is_null() {
+            // SAFETY: promised by the caller.
+            drop(unsafe { Box::from_raw(estimator) });
+        }
+        Ok(())
+    });
+}
+
+/// Changes one option, after `change` has said that its value is in range.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+unsafe fn set(
+    estimator: *mut iine_estimator,
+    change: impl FnOnce(&mut Options) -> Result<(), Error>,
+) -> i32 {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        change(unsafe { reference_mut(estimator) }?.estimator.options_mut())
+    })
+}
+
+/// Sets the method: one of IINE_METHOD_*; default IINE_METHOD_AVERAGE_3D_GRADIENT.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_method(
+    estimator: *mut iine_estimator,
+    method: i32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        let known = Method::ALL.into_iter().find(|known| *known as i32 == method);
+        options.method = known.ok_or(Error::OptionValue)?;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// Sets the border policy: one of IINE_BORDER_POLICY_*; default IINE_BORDER_POLICY_IGNORE.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_border_policy(
+    estimator: *mut iine_estimator,
+    border_policy: i32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        let known = BorderPolicy::ALL.into_iter().find(|known| *known as i32 == border_policy);
+        options.border_policy = known.ok_or(Error::OptionValue)?;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// Sets the smoothing size in pixels, the side of the largest window: finite, above 0; default 10.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_normal_smoothing_size(
+    estimator: *mut iine_estimator,
+    normal_smoothing_size: f32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        if !(normal_smoothing_size.is_finite() && normal_smoothing_size > 0.0) {
+            return Err(Error::OptionValue);
+        }
+        options.normal_smoothing_size = normal_smoothing_size;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// Whether a tenth of a pixel's z (signed, in the cloud's unit) is added to its smoothing size: 0 (the default)
+/// or 1.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_depth_dependent_smoothing(
+    estimator: *mut iine_estimator,
+    depth_dependent_smoothing: i32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        options.depth_dependent_smoothing = match depth_dependent_smoothing {
+            0 => false,
+            1 => true,
+            _ => return Err(Error::OptionValue),
+        };
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// Sets the factor of the depth change threshold: two neighbours are a depth change apart if their z differ by
+/// more than 2 * factor * (|z| + 1), in the cloud's unit. Any number; default 0.02.
+///
+/// Errors: IINE_ERROR_NULL_POINTER.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_max_depth_change_factor(
+    estimator: *mut iine_estimator,
+    max_depth_change_factor: f32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        options.max_depth_change_factor = max_depth_change_factor;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// Sets the point that normals are turned towards, in the cloud's coordinates. Any numbers; default (0, 0, 0).
+///
+/// Errors: IINE_ERROR_NULL_POINTER.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_viewpoint(
+    estimator: *mut iine_estimator,
+    x: f32,
+    y: f32,
+    z: f32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        options.viewpoint = [x, y, z];
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// Sets the number of threads: 1 (the default) computes on the calling thread, 0 takes one per core. The result
+/// does not depend on it, bit for bit.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE above 1024.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_threads(
+    estimator: *mut iine_estimator,
+    threads: u32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        if threads > 1024 {
+            return Err(Error::OptionValue);
+        }
+        options.threads = threads as usize;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// # Safety
+/// `points` is NULL or a struct as its `struct_size` says, whose pixels are readable for `'a`.
+unsafe fn read_points<'a>(points: *const iine_points) -> Result<Points<'a>, Error> {
+    // SAFETY: promised by the caller.
+    let p = unsafe { read_sized(points, &[size_of::<iine_points>()]) }?;
+    let (width, height) = (p.width as usize, p.height as usize);
+    // SAFETY: promised by the caller.
+    unsafe { Points::from_raw([p.x, p.y, p.z], width, height, p.point_stride, p.row_stride) }
+}
+
+/// # Safety
+/// `normals` is NULL or a struct as its `struct_size` says, whose fields are writable for `width` x `height`
+/// pixels for `'a`.
+unsafe fn read_normals<'a>(
+    normals: *const iine_normals,
+    width: usize,
+    height: usize,
+    packed_rows: bool,
+) -> Result<Normals<'a>, Error> {
+    // SAFETY: promised by the caller.
+    let n = unsafe { read_sized(normals, &[size_of::<iine_normals>()]) }?;
+    let row_stride = |stride| if packed_rows { 0 } else { stride };
+    let strides = [n.point_stride, row_stride(n.row_stride)];
+    let curvature_strides = [n.curvature_point_stride, row_stride(n.curvature_row_stride)];
+    let curvature = (!n.curvature.is_null()).then_some((n.curvature, curvature_strides));
+    // SAFETY: promised by the caller.
+    unsafe { Normals::from_raw([n.nx, n.ny, n.nz], width, height, strides, curvature) }
+}
+
+/// Computes the normal of every pixel of `points` into `normals`.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_STRUCT_SIZE, IINE_ERROR_SIZE, IINE_ERROR_STRIDE,
+/// IINE_ERROR_MISALIGNED, IINE_ERROR_OVERLAP, IINE_ERROR_UNSUPPORTED, IINE_ERROR_OUT_OF_MEMORY,
+/// IINE_ERROR_THREADS. Nothing is written then.
+///
+/// # Safety
+/// The pointers are NULL or valid as their structs say, for the whole call; no other thread uses `estimator` or
+/// writes to the points or accesses the normals meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_compute(
+    estimator: *mut iine_estimator,
+    points: *const iine_points,
+    normals: *const iine_normals,
+) -> i32 {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let estimator = &mut unsafe { reference_mut(estimator) }?.estimator;
+        // SAFETY: promised by the caller.
+        let points = unsafe { read_points(points) }?;
+        // SAFETY: promised by the caller.
+        let mut normals = unsafe { read_normals(normals, points.width(), points.height(), false) }?;
+        estimator.compute(&points, &mut normals)
+    })
+}
+
+/// Computes the normals of the pixels that `indices` lists (row * width + column, any order, repeats allowed):
+/// element k of `normals`, `normals->point_stride` bytes after element k - 1, belongs to indices[k] and equals
+/// what `iine_estimator_compute` gives for that pixel. A `count` of 0 does nothing.
+///
+/// Errors: as `iine_estimator_compute`, and IINE_ERROR_INDEX if an index is outside the cloud. Nothing is
+/// written then.
+///
+/// # Safety
+/// As `iine_estimator_compute`; `indices` is NULL or valid for `count` reads.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_compute_indices(
+    estimator: *mut iine_estimator,
+    points: *const iine_points,
+    indices: *const i32,
+    count: usize,
+    normals: *const iine_normals,
+) -> i32 {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let estimator = &mut unsafe { reference_mut(estimator) }?.estimator;
+        // SAFETY: promised by the caller.
+        let points = unsafe { read_points(points) }?;
+        // SAFETY: promised by the caller.
+        unsafe { reference(indices) }?;
+        if count == 0 {
+            return Ok(());
+        }
+        if count > isize::MAX as usize / size_of::<i32>() {
+            return Err(Error::Size);
+        }
+        // SAFETY: promised by the caller; neither NULL nor misaligned, and the size fits.
+        let indices = unsafe { std::slice::from_raw_parts(indices, count) };
+        // SAFETY: promised by the caller.
+        let mut normals = unsafe { read_normals(normals, count, 1, true) }?;
+        estimator.compute_indices(&points, indices, &mut normals)
+    })
+}
+
+/// Computes the maps behind the normals: those whose pointers in `maps` are not NULL.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_STRUCT_SIZE, IINE_ERROR_SIZE, IINE_ERROR_STRIDE,
+/// IINE_ERROR_MISALIGNED, IINE_ERROR_OUT_OF_MEMORY. Nothing is written then.
+///
+/// # Safety
+/// The pointers are NULL or valid as their structs say, for the whole call; each map is valid for width * height
+/// writes and overlaps neither the points nor another map; no other thread uses `estimator` meanwhile.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_compute_maps(
+    estimator: *mut iine_estimator,
+    points: *const iine_points,
+    maps: *const iine_maps,
+) -> i32 {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let estimator = &mut unsafe { reference_mut(estimator) }?.estimator;
+        // SAFETY: promised by the caller.
+        let points = unsafe { read_points(points) }?;
+        // SAFETY: promised by the caller.
+        let maps = unsafe { read_sized(maps, &[size_of::<iine_maps>()]) }?;
+        let pixels = points.width() * points.height();
+        // SAFETY: promised by the caller.
+        let mut maps = unsafe {
+            Maps {
+                depth_changes: optional_slice(maps.depth_changes, pixels)?,
+                distances: optional_slice(maps.distances, pixels)?,
+                smoothing_areas: optional_slice(maps.smoothing_areas, pixels)?,
+            }
+        };
+        estimator.compute_maps(&points, &mut maps)
+    })
+}
+
+/// # Safety
+/// `pointer` is NULL or valid for `length` writes for `'a`, and nobody else uses it meanwhile.
+unsafe fn optional_slice<'a, T>(
+    pointer: *mut T,
+    length: usize,
+) -> Result<Option<&'a mut [T]>, Error> {
+    if pointer.is_null() {
+        return Ok(None);
+    }
+    check_writable(pointer)?;
+    // SAFETY: promised by the caller; the length passed as a count of pixels, so its bytes fit.
+    Ok(Some(unsafe { std::slice::from_raw_parts_mut(pointer, length) }))
+}
+
+/// Writes to `*bytes` how much scratch memory the estimator holds, in bytes.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_MISALIGNED.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread changes; `bytes` is NULL or valid for a write.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_scratch_size(
+    estimator: *const iine_estimator,
+    bytes: *mut usize,
+) -> i32 {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let size = unsafe { reference(estimator) }?.estimator.scratch_size();
+        // SAFETY: promised by the caller.
+        unsafe { write(bytes, size) }
+    })
+}
+
+/// Frees the estimator's scratch memory and worker threads; the next computation makes them anew.
+///
+/// Errors: IINE_ERROR_NULL_POINTER.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_release_scratch(estimator: *mut iine_estimator) -> i32 {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        unsafe { reference_mut(estimator) }?.estimator.release_scratch();
+        Ok(())
+    })
+}

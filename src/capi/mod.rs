@@ -1,0 +1,9 @@
+//! The C boundary and nothing else: it checks what C may get wrong, and calls the safe core.
+//!
+//! The header `include/iine/iine.h` is generated from these files; a test regenerates and compares it.
+
+mod boundary;
+mod estimator;
+mod status;
+mod types;
+mod version;

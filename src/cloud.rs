@@ -1,0 +1,400 @@
+//! Borrowed views over organized buffers: points in, normals out. Nothing is copied.
+//!
+//! A view is a base address per field, a stride from pixel to pixel and a stride from row to row. That covers
+//! interleaved points of any size, rows with padding, and separate planes; and because a view is not a slice,
+//! points and normals may be disjoint fields of one array.
+
+use std::marker::PhantomData;
+
+use crate::Error;
+
+/// The geometry that all fields of a view share. Strides are in bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Grid {
+    pub width: usize,
+    pub height: usize,
+    pub point_stride: usize,
+    pub row_stride: usize,
+}
+
+const FIELD: usize = size_of::<f32>();
+
+impl Grid {
+    /// Checks the sizes and strides; a `row_stride` of 0 means packed rows.
+    pub fn new(
+        width: usize,
+        height: usize,
+        point_stride: usize,
+        row_stride: usize,
+    ) -> Result<Self, Error> {
+        if width == 0 || height == 0 || width > i32::MAX as usize || height > i32::MAX as usize {
+            return Err(Error::Size);
+        }
+        if !point_stride.is_multiple_of(FIELD) || !row_stride.is_multiple_of(FIELD) {
+            return Err(Error::Stride);
+        }
+        if point_stride < FIELD {
+            return Err(Error::Stride);
+        }
+        let packed = width.checked_mul(point_stride).ok_or(Error::Size)?;
+        let row_stride = if row_stride == 0 { packed } else { row_stride };
+        if row_stride < packed {
+            return Err(Error::Stride);
+        }
+        let bytes = row_stride.checked_mul(height).ok_or(Error::Size)?;
+        // Pixel numbers are 32-bit in indices and in PCL; byte offsets must fit a pointer difference.
+        let pixels = width.checked_mul(height).ok_or(Error::Size)?;
+        if bytes > isize::MAX as usize || pixels > i32::MAX as usize {
+            return Err(Error::Size);
+        }
+        Ok(Grid { width, height, point_stride, row_stride })
+    }
+
+    /// Bytes from the first pixel's field to the end of the last one's.
+    fn extent(&self) -> usize {
+        (self.height - 1) * self.row_stride + (self.width - 1) * self.point_stride + FIELD
+    }
+
+    /// Byte offset of pixel `(x, y)`.
+    #[inline(always)]
+    pub fn offset(&self, x: usize, y: usize) -> usize {
+        y * self.row_stride + x * self.point_stride
+    }
+
+    /// Whether a field of this grid at address `a` shares a byte with a field of `other` at address `b`.
+    fn collides(&self, a: usize, other: &Grid, b: usize) -> bool {
+        if a + self.extent() <= b || b + other.extent() <= a {
+            return false;
+        }
+        let same_lattice =
+            self.point_stride == other.point_stride && self.row_stride == other.row_stride;
+        if !same_lattice {
+            return true;
+        }
+        // Addresses are multiples of 4, so fields share a byte only where they are equal:
+        // b - a = i * point_stride + j * row_stride.
+        let (ps, rs) = (self.point_stride as i128, self.row_stride as i128);
+        let difference = b as i128 - a as i128;
+        let rows = self.height.max(other.height) as i128;
+        let columns = self.width.max(other.width) as i128;
+        (1 - rows..rows).any(|j| {
+            let rest = difference - j * rs;
+            rest % ps == 0 && (rest / ps).abs() < columns
+        })
+    }
+}
+
+/// One field's base address, checked for NULL and alignment.
+fn check_field(field: *const f32, grid: &Grid) -> Result<usize, Error> {
+    if field.is_null() {
+        return Err(Error::NullPointer);
+    }
+    let address = field.addr();
+    if !address.is_multiple_of(FIELD) {
+        return Err(Error::Misaligned);
+    }
+    address.checked_add(grid.extent()).ok_or(Error::Size)?;
+    Ok(address)
+}
+
+/// The points of an organized cloud: `width` x `height` pixels of x, y, z in any unit of length, z being depth.
+///
+/// A missing point has a non-finite coordinate.
+#[derive(Clone, Copy, Debug)]
+pub struct Points<'a> {
+    x: *const f32,
+    y: *const f32,
+    z: *const f32,
+    grid: Grid,
+    lifetime: PhantomData<&'a [f32]>,
+}
+
+// SAFETY: a view only reads, and the memory is borrowed for 'a (or promised by the caller of `from_raw`).
+unsafe impl Send for Points<'_> {}
+// SAFETY: as above.
+unsafe impl Sync for Points<'_> {}
+
+impl<'a> Points<'a> {
+    /// Interleaved points: x, y, z are the first three floats of every pixel.
+    ///
+    /// `point_stride` (at least 3) and `row_stride` (0 for packed rows, else at least `width * point_stride`)
+    /// count floats. Errors: [`Error::Size`] if a size is zero or `data` is too short, [`Error::Stride`].
+    pub fn interleaved(
+        data: &'a [f32],
+        width: usize,
+        height: usize,
+        point_stride: usize,
+        row_stride: usize,
+    ) -> Result<Self, Error> {
+        if point_stride < 3 {
+            return Err(Error::Stride);
+        }
+        let grid = float_grid(width, height, point_stride, row_stride)?;
+        check_length(data.len(), &grid, 3)?;
+        let x = data.as_ptr();
+        // SAFETY: `data` is borrowed for 'a, and `check_length` saw that it holds three floats at every pixel.
+        unsafe { Self::from_grid(x, x.wrapping_add(1), x.wrapping_add(2), grid) }
+    }
+
+    /// Three separate planes; `row_stride` (0 for packed rows, else at least `width`) counts floats.
+    ///
+    /// Errors: [`Error::Size`] if a size is zero or a plane is too short, [`Error::Stride`].
+    pub fn planes(
+        [x, y, z]: [&'a [f32]; 3],
+        width: usize,
+        height: usize,
+        row_stride: usize,
+    ) -> Result<Self, Error> {
+        let grid = float_grid(width, height, 1, row_stride)?;
+        for plane in [x, y, z] {
+            check_length(plane.len(), &grid, 1)?;
+        }
+        // SAFETY: the planes are borrowed for 'a, and `check_length` saw that each holds a float at every pixel.
+        unsafe { Self::from_grid(x.as_ptr(), y.as_ptr(), z.as_ptr(), grid) }
+    }
+
+    /// A view from the addresses of the first pixel's x, y and z. Strides are in bytes, multiples of 4;
+    /// `row_stride` 0 means packed rows.
+    ///
+    /// Errors: [`Error::NullPointer`], [`Error::Misaligned`], [`Error::Size`], [`Error::Stride`].
+    ///
+    /// # Safety
+    /// Every pixel's three floats must be readable, and not written by anyone else, for `'a`.
+    pub unsafe fn from_raw(
+        [x, y, z]: [*const f32; 3],
+        width: usize,
+        height: usize,
+        point_stride: usize,
+        row_stride: usize,
+    ) -> Result<Self, Error> {
+        let grid = Grid::new(width, height, point_stride, row_stride)?;
+        // SAFETY: promised by the caller.
+        unsafe { Self::from_grid(x, y, z, grid) }
+    }
+
+    /// # Safety
+    /// As [`Points::from_raw`].
+    unsafe fn from_grid(
+        x: *const f32,
+        y: *const f32,
+        z: *const f32,
+        grid: Grid,
+    ) -> Result<Self, Error> {
+        for field in [x, y, z] {
+            check_field(field, &grid)?;
+        }
+        Ok(Points { x, y, z, grid, lifetime: PhantomData })
+    }
+
+    /// Pixels in a row.
+    pub fn width(&self) -> usize {
+        self.grid.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.grid.height
+    }
+
+    /// The point at column `x`, row `y`.
+    ///
+    /// # Panics
+    /// If the pixel is outside the cloud.
+    #[inline(always)]
+    pub fn at(&self, x: usize, y: usize) -> [f32; 3] {
+        assert!(x < self.grid.width && y < self.grid.height);
+        // SAFETY: the pixel is inside the grid that the constructor vouched for.
+        unsafe { self.at_unchecked(x, y) }
+    }
+
+    /// The point at column `x`, row `y`.
+    ///
+    /// # Safety
+    /// `x < width` and `y < height`.
+    #[inline(always)]
+    pub(crate) unsafe fn at_unchecked(&self, x: usize, y: usize) -> [f32; 3] {
+        let offset = self.grid.offset(x, y);
+        // SAFETY: promised by the caller; alignment was checked by the constructor.
+        unsafe {
+            [
+                self.x.byte_add(offset).read(),
+                self.y.byte_add(offset).read(),
+                self.z.byte_add(offset).read(),
+            ]
+        }
+    }
+
+    /// The depth at column `x`, row `y`.
+    ///
+    /// # Panics
+    /// If the pixel is outside the cloud.
+    #[inline(always)]
+    pub fn z(&self, x: usize, y: usize) -> f32 {
+        self.at(x, y)[2]
+    }
+
+    fn fields(&self) -> [usize; 3] {
+        [self.x.addr(), self.y.addr(), self.z.addr()]
+    }
+
+    /// The shared geometry, and the addresses of row `y`'s first x, y and z.
+    #[inline(always)]
+    #[allow(dead_code)]
+    pub(crate) fn row(&self, y: usize) -> (Grid, [*const f32; 3]) {
+        assert!(y < self.grid.height);
+        let offset = y * self.grid.row_stride;
+        // Within the allocation, as y is inside the grid; the reader's loads state their own bounds.
+        let at = |field: *const f32| field.wrapping_byte_add(offset);
+        (self.grid, [at(self.x), at(self.y), at(self.z)])
+    }
+}
+
+/// Where normals go: nx, ny, nz and, if wanted, the curvature of every pixel. Other bytes stay untouched.
+#[derive(Debug)]
+pub struct Normals<'a> {
+    normal: [*mut f32; 3],
+    grid: Grid,
+    curvature: Option<(*mut f32, Grid)>,
+    lifetime: PhantomData<&'a mut [f32]>,
+}
+
+// SAFETY: the memory is borrowed mutably for 'a (or promised by the caller of `from_raw`).
+unsafe impl Send for Normals<'_> {}
+// SAFETY: writes go through methods whose callers give every pixel to one thread only.
+unsafe impl Sync for Normals<'_> {}
+
+impl<'a> Normals<'a> {
+    /// Interleaved output: nx, ny, nz are the first three floats of every pixel, the curvature, if wanted, is at
+    /// `curvature_offset` (at least 3). Strides count floats, as in [`Points::interleaved`]; so `pcl::Normal` is
+    /// stride 8, curvature 4.
+    ///
+    /// Errors: [`Error::Size`] if a size is zero or `data` is too short, [`Error::Stride`], [`Error::Overlap`].
+    pub fn interleaved(
+        data: &'a mut [f32],
+        width: usize,
+        height: usize,
+        point_stride: usize,
+        row_stride: usize,
+        curvature_offset: Option<usize>,
+    ) -> Result<Self, Error> {
+        let fields = curvature_offset.map_or(3, |offset| offset.saturating_add(1)).max(3);
+        if point_stride < fields {
+            return Err(Error::Stride);
+        }
+        let grid = float_grid(width, height, point_stride, row_stride)?;
+        check_length(data.len(), &grid, fields)?;
+        let nx = data.as_mut_ptr();
+        let curvature = curvature_offset.map(|offset| (nx.wrapping_add(offset), grid));
+        // SAFETY: `data` is borrowed mutably for 'a, and `check_length` saw that it holds every field.
+        unsafe { Self::from_grid([nx, nx.wrapping_add(1), nx.wrapping_add(2)], grid, curvature) }
+    }
+
+    /// A view from the addresses of the first pixel's nx, ny, nz and, if wanted, curvature, which has strides of
+    /// its own. Strides are in bytes, multiples of 4; a row stride of 0 means packed rows.
+    ///
+    /// Errors: [`Error::NullPointer`], [`Error::Misaligned`], [`Error::Size`], [`Error::Stride`],
+    /// [`Error::Overlap`] if two of the fields share a byte.
+    ///
+    /// # Safety
+    /// Every pixel's fields must be writable, and not touched by anyone else, for `'a`.
+    pub unsafe fn from_raw(
+        normal: [*mut f32; 3],
+        width: usize,
+        height: usize,
+        [point_stride, row_stride]: [usize; 2],
+        curvature: Option<(*mut f32, [usize; 2])>,
+    ) -> Result<Self, Error> {
+        let grid = Grid::new(width, height, point_stride, row_stride)?;
+        let curvature = match curvature {
+            Some((field, [point, row])) => Some((field, Grid::new(width, height, point, row)?)),
+            None => None,
+        };
+        // SAFETY: promised by the caller.
+        unsafe { Self::from_grid(normal, grid, curvature) }
+    }
+
+    /// # Safety
+    /// As [`Normals::from_raw`].
+    unsafe fn from_grid(
+        normal: [*mut f32; 3],
+        grid: Grid,
+        curvature: Option<(*mut f32, Grid)>,
+    ) -> Result<Self, Error> {
+        let normals = Normals { normal, grid, curvature, lifetime: PhantomData };
+        let fields = normals.fields();
+        for (field, grid) in fields.iter().flatten() {
+            check_field(*field, grid)?;
+        }
+        for (i, (a, grid_a)) in fields.iter().flatten().enumerate() {
+            for (b, grid_b) in fields.iter().flatten().skip(i + 1) {
+                if grid_a.collides(a.addr(), grid_b, b.addr()) {
+                    return Err(Error::Overlap);
+                }
+            }
+        }
+        Ok(normals)
+    }
+
+    fn fields(&self) -> [Option<(*const f32, Grid)>; 4] {
+        let [nx, ny, nz] = self.normal.map(|field| Some((field.cast_const(), self.grid)));
+        let curvature = self.curvature.map(|(field, grid)| (field.cast_const(), grid));
+        [nx, ny, nz, curvature]
+    }
+
+    /// Pixels in a row.
+    pub fn width(&self) -> usize {
+        self.grid.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.grid.height
+    }
+
+    /// Refuses output that shares a byte with `points`' coordinates.
+    pub(crate) fn check_disjoint(&self, points: &Points) -> Result<(), Error> {
+        for (field, grid) in self.fields().iter().flatten() {
+            for input in points.fields() {
+                if grid.collides(field.addr(), &points.grid, input) {
+                    return Err(Error::Overlap);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes one pixel.
+    ///
+    /// # Safety
+    /// `x < width`, `y < height`, and no other thread accesses this pixel's normal at the same time.
+    #[inline(always)]
+    pub(crate) unsafe fn write(&self, x: usize, y: usize, normal: [f32; 3], curvature: f32) {
+        let offset = self.grid.offset(x, y);
+        // SAFETY: the pixel is inside the grid that the constructor vouched for, and ours alone.
+        unsafe {
+            self.normal[0].byte_add(offset).write(normal[0]);
+            self.normal[1].byte_add(offset).write(normal[1]);
+            self.normal[2].byte_add(offset).write(normal[2]);
+            if let Some((field, grid)) = self.curvature {
+                field.byte_add(grid.offset(x, y)).write(curvature);
+            }
+        }
+    }
+}
+
+/// A grid whose strides are given in floats.
+fn float_grid(
+    width: usize,
+    height: usize,
+    point_stride: usize,
+    row_stride: usize,
+) -> Result<Grid, Error> {
+    let bytes = |floats: usize| floats.checked_mul(FIELD).ok_or(Error::Size);
+    Grid::new(width, height, bytes(point_stride)?, bytes(row_stride)?)
+}
+
+/// Refuses a slice too short to hold `fields` floats at every pixel.
+fn check_length(length: usize, grid: &Grid, fields: usize) -> Result<(), Error> {
+    let needed = grid.extent() / FIELD + fields - 1;
+    if length < needed { Err(Error::Size) } else { Ok(()) }
+}

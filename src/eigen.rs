@@ -1,0 +1,59 @@
+//! The eigenvector of the smallest eigenvalue of a symmetric 3x3 matrix.
+
+/// A symmetric 3x3 matrix: its upper triangle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Symmetric3 {
+    pub xx: f64,
+    pub xy: f64,
+    pub xz: f64,
+    pub yy: f64,
+    pub yz: f64,
+    pub zz: f64,
+}
+
+impl Symmetric3 {
+    /// Adds `v v^T`.
+    pub fn add_outer(&mut self, v: [f64; 3]) {
+        self.xx += v[0] * v[0];
+        self.xy += v[0] * v[1];
+        self.xz += v[0] * v[2];
+        self.yy += v[1] * v[1];
+        self.yz += v[1] * v[2];
+        self.zz += v[2] * v[2];
+    }
+
+    pub fn trace(&self) -> f64 {
+        self.xx + self.yy + self.zz
+    }
+}
+
+/// The smallest eigenvalue of a positive semidefinite matrix that is not zero, and its unit eigenvector.
+///
+/// Cyclic Jacobi rotations: slow, and right to the last bits whatever the eigenvalues are.
+pub(crate) fn smallest_eigenpair(m: &Symmetric3) -> (f64, [f64; 3]) {
+    let mut a = [[m.xx, m.xy, m.xz], [m.xy, m.yy, m.yz], [m.xz, m.yz, m.zz]];
+    let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    const SWEEPS: usize = 12; // convergence is quadratic: 5 or 6 are enough
+    for _ in 0..SWEEPS {
+        for (p, q) in [(0, 1), (0, 2), (1, 2)] {
+            if a[p][q] == 0.0 {
+                continue;
+            }
+            let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
+            let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+            let c = 1.0 / (t * t + 1.0).sqrt();
+            let s = t * c;
+            for row in &mut a {
+                (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+            }
+            for k in 0..3 {
+                (a[p][k], a[q][k]) = (c * a[p][k] - s * a[q][k], s * a[p][k] + c * a[q][k]);
+            }
+            for row in &mut v {
+                (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
+            }
+        }
+    }
+    let smallest = (0..3).min_by(|&i, &j| a[i][i].total_cmp(&a[j][j])).unwrap_or(0);
+    (a[smallest][smallest].max(0.0), [v[0][smallest], v[1][smallest], v[2][smallest]])
+}

@@ -1,0 +1,82 @@
+//! What can be wrong with a request.
+
+use std::fmt;
+
+/// Why a request was refused. Nothing has been written when one of these is returned.
+///
+/// The discriminants are the status numbers of the C API; they are never reused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+#[repr(i32)]
+pub enum Error {
+    /// A required pointer is NULL.
+    NullPointer = 1,
+    /// A struct's `struct_size` field is not one that this or an earlier version defines.
+    StructSize = 2,
+    /// A width or height is zero, or the buffer they describe does not fit the address space or the slice given.
+    Size = 3,
+    /// A stride is not a multiple of 4 bytes, or too small for what it steps over.
+    Stride = 4,
+    /// A pointer to `float` is not aligned to 4 bytes.
+    Misaligned = 5,
+    /// Output bytes overlap input bytes or other output bytes.
+    Overlap = 6,
+    /// An option's value is outside its range, or an enum's number is unknown.
+    OptionValue = 7,
+    /// The method does not support the border policy (SIMPLE_3D_GRADIENT with MIRROR).
+    Unsupported = 8,
+    /// An index is negative or not below width x height.
+    Index = 9,
+    /// Scratch memory could not be allocated.
+    OutOfMemory = 10,
+    /// The worker threads asked for could not be started.
+    Threads = 11,
+    /// A defect of this library was caught at its boundary; please report it.
+    Internal = 12,
+}
+
+impl Error {
+    /// Every error, in the order of the numbers.
+    pub const ALL: [Error; 12] = [
+        Error::NullPointer,
+        Error::StructSize,
+        Error::Size,
+        Error::Stride,
+        Error::Misaligned,
+        Error::Overlap,
+        Error::OptionValue,
+        Error::Unsupported,
+        Error::Index,
+        Error::OutOfMemory,
+        Error::Threads,
+        Error::Internal,
+    ];
+
+    /// The message, NUL-terminated for C.
+    pub(crate) const fn c_message(self) -> &'static std::ffi::CStr {
+        match self {
+            Error::NullPointer => c"a required pointer is NULL",
+            Error::StructSize => c"struct_size is not a known size of the struct",
+            Error::Size => c"width or height is zero, or the buffer does not fit",
+            Error::Stride => c"a stride is not a multiple of 4 bytes or is too small",
+            Error::Misaligned => c"a pointer to float is not aligned to 4 bytes",
+            Error::Overlap => c"output bytes overlap input bytes or other output bytes",
+            Error::OptionValue => c"an option's value is outside its range",
+            Error::Unsupported => {
+                c"BORDER_POLICY_MIRROR is not supported for the method SIMPLE_3D_GRADIENT"
+            }
+            Error::Index => c"an index is outside the cloud",
+            Error::OutOfMemory => c"out of memory",
+            Error::Threads => c"the worker threads could not be started",
+            Error::Internal => c"internal error (a defect of this library)",
+        }
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.c_message().to_str().unwrap_or("error"))
+    }
+}
+
+impl std::error::Error for Error {}

@@ -1,0 +1,176 @@
+//! The estimator: options and scratch memory, and the steps in their order.
+
+use crate::Error;
+use crate::cloud::{Normals, Points};
+use crate::depth_change::depth_change_map;
+use crate::distance::distance_map;
+use crate::methods::{Estimate, estimate};
+use crate::options::Options;
+use crate::orientation::turn_to_viewpoint;
+use crate::smoothing_area::window_side;
+use crate::window::Image;
+
+/// The maps behind the normals; each is written if it is there and must hold width x height elements, row by row.
+#[derive(Debug, Default)]
+pub struct Maps<'a> {
+    /// Depth change indication map (the paper's C): 1 at a depth change, else 0.
+    pub depth_changes: Option<&'a mut [u8]>,
+    /// Distance to the nearest depth change in pixels (the paper's T; PCL's `getDistanceMap`).
+    pub distances: Option<&'a mut [f32]>,
+    /// Smoothing area map (the paper's R): the side of the pixel's window in pixels, 0 where there is none.
+    pub smoothing_areas: Option<&'a mut [f32]>,
+}
+
+/// Estimates the normals of organized point clouds. Owns its scratch memory, which is reused from frame to frame.
+#[derive(Debug)]
+pub struct Estimator {
+    options: Options,
+}
+
+impl Estimator {
+    /// An estimator with these options.
+    pub fn new(options: Options) -> Self {
+        Estimator { options }
+    }
+
+    /// The options.
+    pub fn options(&self) -> &Options {
+        &self.options
+    }
+
+    /// The options, to change; they are checked when something is computed.
+    pub fn options_mut(&mut self) -> &mut Options {
+        &mut self.options
+    }
+
+    /// Computes the normal of every pixel of `points` into `normals`, which must be of the same size.
+    ///
+    /// Normals have unit length and point to the viewpoint's side; pixels without one get NaN, also as curvature.
+    /// Errors: [`Error::Size`] if the sizes differ, [`Error::Overlap`], and what [`Options::check`] refuses.
+    pub fn compute(&mut self, points: &Points, normals: &mut Normals) -> Result<(), Error> {
+        self.options.check()?;
+        if (points.width(), points.height()) != (normals.width(), normals.height()) {
+            return Err(Error::Size);
+        }
+        normals.check_disjoint(points)?;
+        let plain = Plain::new(points, &self.options);
+        for y in 0..points.height() {
+            for x in 0..points.width() {
+                let Estimate { normal, curvature } = plain.estimate(x, y);
+                // SAFETY: the sizes are equal, and no other thread is at work.
+                unsafe { normals.write(x, y, normal, curvature) };
+            }
+        }
+        Ok(())
+    }
+
+    /// Computes the normals of the pixels that `indices` lists (row * width + column, any order, repeats
+    /// allowed): element k of `normals`, which must be `indices.len()` x 1, belongs to `indices[k]` and equals what
+    /// [`Estimator::compute`] gives for that pixel.
+    ///
+    /// Errors: as [`Estimator::compute`], and [`Error::Index`].
+    pub fn compute_indices(
+        &mut self,
+        points: &Points,
+        indices: &[i32],
+        normals: &mut Normals,
+    ) -> Result<(), Error> {
+        self.options.check()?;
+        if (normals.width(), normals.height()) != (indices.len(), 1) {
+            return Err(Error::Size);
+        }
+        let pixels = points.width() * points.height();
+        if indices.iter().any(|&index| usize::try_from(index).map_or(true, |i| i >= pixels)) {
+            return Err(Error::Index);
+        }
+        normals.check_disjoint(points)?;
+        let plain = Plain::new(points, &self.options);
+        for (k, &index) in indices.iter().enumerate() {
+            let (x, y) = (index as usize % points.width(), index as usize / points.width());
+            let Estimate { normal, curvature } = plain.estimate(x, y);
+            // SAFETY: `normals` has an element for every index, and no other thread is at work.
+            unsafe { normals.write(k, 0, normal, curvature) };
+        }
+        Ok(())
+    }
+
+    /// Computes the maps behind the normals.
+    ///
+    /// Errors: [`Error::Size`] if a map's length is not width x height, and what [`Options::check`] refuses.
+    pub fn compute_maps(&mut self, points: &Points, maps: &mut Maps) -> Result<(), Error> {
+        self.options.check()?;
+        let (width, height) = (points.width(), points.height());
+        let lengths = [
+            maps.depth_changes.as_ref().map(|map| map.len()),
+            maps.distances.as_ref().map(|map| map.len()),
+            maps.smoothing_areas.as_ref().map(|map| map.len()),
+        ];
+        if lengths.into_iter().flatten().any(|length| length != width * height) {
+            return Err(Error::Size);
+        }
+        let plain = Plain::new(points, &self.options);
+        if let Some(map) = &mut maps.depth_changes {
+            for (to, from) in map.iter_mut().zip(&plain.depth_changes) {
+                *to = u8::from(*from);
+            }
+        }
+        if let Some(map) = &mut maps.distances {
+            map.copy_from_slice(&plain.distances);
+        }
+        if let Some(map) = &mut maps.smoothing_areas {
+            for (at, to) in map.iter_mut().enumerate() {
+                *to = plain.window_side(at % width, at / width) as f32;
+            }
+        }
+        Ok(())
+    }
+
+    /// How much scratch memory is held, in bytes.
+    pub fn scratch_size(&self) -> usize {
+        0
+    }
+
+    /// Frees the scratch memory and the worker threads; the next computation makes them anew.
+    pub fn release_scratch(&mut self) {}
+}
+
+/// The plain form of the whole method: the specification that every fast path is held to.
+struct Plain<'a> {
+    points: &'a Points<'a>,
+    options: &'a Options,
+    image: Image,
+    depth_changes: Vec<bool>,
+    distances: Vec<f32>,
+}
+
+impl<'a> Plain<'a> {
+    fn new(points: &'a Points, options: &'a Options) -> Self {
+        let (width, height) = (points.width(), points.height());
+        let depth_changes = depth_change_map(points, options.max_depth_change_factor);
+        let distances = distance_map(&depth_changes, width, height);
+        let image = Image { width, height, border_policy: options.border_policy };
+        Plain { points, options, image, depth_changes, distances }
+    }
+
+    /// The side of a pixel's window; 0 for none.
+    fn window_side(&self, x: usize, y: usize) -> u32 {
+        let Image { width, height, .. } = self.image;
+        let border = self.options.ignored_border();
+        let inside = |at: usize, size: usize| at >= border && at < size.saturating_sub(border);
+        if !(inside(x, width) && inside(y, height)) {
+            return 0;
+        }
+        window_side(self.distances[y * width + x], self.points.z(x, y), self.options)
+    }
+
+    fn estimate(&self, x: usize, y: usize) -> Estimate {
+        let side = self.window_side(x, y) as usize;
+        if side == 0 {
+            return Estimate::NONE;
+        }
+        let found = estimate(self.options.method, self.points, &self.image, (x, y), side);
+        let point = self.points.at(x, y);
+        let normal = turn_to_viewpoint(found.normal, point, self.options.viewpoint);
+        Estimate { normal, ..found }
+    }
+}

@@ -1,0 +1,52 @@
+//! COVARIANCE_MATRIX: the paper's CM (Eq. 16-25): the eigenvector of the smallest eigenvalue of the window's
+//! covariance matrix, and as curvature that eigenvalue over the matrix's trace.
+
+use super::{Estimate, is_finite, start};
+use crate::cloud::Points;
+use crate::eigen::{Symmetric3, smallest_eigenpair};
+use crate::window::Image;
+
+/// The plain form: the matrix about the window's mean, in two passes.
+///
+/// No normal if the window has no finite point, or only one place: then the curvature is 0, as in PCL.
+pub(crate) fn estimate(
+    points: &Points,
+    image: &Image,
+    (x, y): (usize, usize),
+    side: usize,
+) -> Estimate {
+    let window = (start(x, side), start(y, side));
+    let finite = || {
+        image
+            .rects(window, (side, side))
+            .flat_map(|rect| rect.pixels().map(|(x, y)| points.at(x, y)).collect::<Vec<_>>())
+            .filter(|point| is_finite(*point))
+            .map(|point| point.map(f64::from))
+    };
+    let (mut mean, mut count) = ([0.0; 3], 0.0);
+    for point in finite() {
+        for i in 0..3 {
+            mean[i] += point[i];
+        }
+        count += 1.0;
+    }
+    if count == 0.0 {
+        return Estimate::NONE;
+    }
+    mean = mean.map(|sum| sum / count);
+    let mut covariance = Symmetric3::default();
+    for point in finite() {
+        covariance.add_outer([point[0] - mean[0], point[1] - mean[1], point[2] - mean[2]]);
+    }
+    from_covariance(&covariance)
+}
+
+/// The estimate from a (scaled) covariance matrix.
+fn from_covariance(covariance: &Symmetric3) -> Estimate {
+    let trace = covariance.trace();
+    if trace == 0.0 {
+        return Estimate { normal: [f32::NAN; 3], curvature: 0.0 };
+    }
+    let (value, vector) = smallest_eigenpair(covariance);
+    Estimate { normal: vector.map(|c| c as f32), curvature: (value / trace) as f32 }
+}

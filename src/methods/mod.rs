@@ -1,0 +1,70 @@
+//! Step 4: a normal from the points in a pixel's window. One file per method; this is their list.
+//!
+//! Each file gives the method twice: plainly, walking over the window, which is the specification; and in sums
+//! that integral images give in constant time, which is held to it.
+
+pub(crate) mod average_3d_gradient;
+pub(crate) mod average_depth_change;
+pub(crate) mod covariance_matrix;
+pub(crate) mod simple_3d_gradient;
+
+use crate::cloud::Points;
+use crate::options::Method;
+use crate::window::Image;
+
+/// What a method finds: a normal that still may point away from the viewpoint, and a curvature.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Estimate {
+    /// Unit length, or NaN if the window's points span no plane.
+    pub normal: [f32; 3],
+    /// NaN for methods that give none.
+    pub curvature: f32,
+}
+
+impl Estimate {
+    pub const NONE: Estimate = Estimate { normal: [f32::NAN; 3], curvature: f32::NAN };
+}
+
+/// The estimate of pixel `(x, y)` from a window of `side` x `side` pixels, by walking over the window.
+pub(crate) fn estimate(
+    method: Method,
+    points: &Points,
+    image: &Image,
+    pixel: (usize, usize),
+    side: usize,
+) -> Estimate {
+    match method {
+        Method::CovarianceMatrix => covariance_matrix::estimate(points, image, pixel, side),
+        Method::Average3DGradient => average_3d_gradient::estimate(points, image, pixel, side),
+        Method::AverageDepthChange => average_depth_change::estimate(points, image, pixel, side),
+        Method::Simple3DGradient => simple_3d_gradient::estimate(points, image, pixel, side),
+    }
+}
+
+/// The first column or row of a window of `side` around a pixel: even sides reach one pixel less to the far side.
+#[inline(always)]
+pub(crate) fn start(center: usize, side: usize) -> isize {
+    center as isize - (side / 2) as isize
+}
+
+#[inline(always)]
+pub(crate) fn is_finite(point: [f32; 3]) -> bool {
+    point.iter().all(|c| c.is_finite())
+}
+
+#[inline(always)]
+pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// The unit vector along the cross product of two tangents; none if they are parallel.
+#[inline(always)]
+pub(crate) fn normal_of_tangents(vertical: [f64; 3], horizontal: [f64; 3]) -> Estimate {
+    let n = cross(vertical, horizontal);
+    let squared_length = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+    if squared_length == 0.0 {
+        return Estimate::NONE;
+    }
+    let length = squared_length.sqrt();
+    Estimate { normal: n.map(|c| (c / length) as f32), curvature: f32::NAN }
+}

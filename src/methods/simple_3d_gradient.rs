@@ -1,0 +1,38 @@
+//! SIMPLE_3D_GRADIENT: the cross product of the differences of one-pixel-wide strips at the window's edges.
+
+use super::{Estimate, is_finite, normal_of_tangents, start};
+use crate::cloud::Points;
+use crate::window::Image;
+
+/// The plain form: right strip minus left strip, lower strip minus upper strip.
+///
+/// As PCL, points with a non-finite coordinate are missing from their strips, and the right and lower strips lie
+/// `side / 2` from the pixel (for even sides just outside the window).
+pub(crate) fn estimate(
+    points: &Points,
+    image: &Image,
+    (x, y): (usize, usize),
+    side: usize,
+) -> Estimate {
+    let half = (side / 2) as isize;
+    let (left, top) = (start(x, side), start(y, side));
+    let (right, bottom) = (x as isize + half, y as isize + half);
+    let strip = |start, size| {
+        let mut sum = [0.0; 3];
+        for rect in image.rects(start, size) {
+            for (x, y) in rect.pixels() {
+                let point = points.at(x, y);
+                if is_finite(point) {
+                    for i in 0..3 {
+                        sum[i] += f64::from(point[i]);
+                    }
+                }
+            }
+        }
+        sum
+    };
+    let difference = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
+    let horizontal = difference(strip((right, top), (1, side)), strip((left, top), (1, side)));
+    let vertical = difference(strip((left, bottom), (side, 1)), strip((left, top), (side, 1)));
+    normal_of_tangents(vertical, horizontal)
+}

@@ -1,0 +1,26 @@
+//! Step 3: the smoothing area map (the paper's R, Eq. 8): the side of every pixel's window.
+
+use crate::options::Options;
+
+/// The least value of the smoothing area that gives a window; PCL asks for more than this.
+const SMALLEST: f32 = 2.0;
+
+/// The largest side a window can have; larger than any image.
+const LARGEST: f32 = i32::MAX as f32;
+
+/// How far a pixel at depth `z` may be smoothed: the paper's B (Eq. 5), as PCL defines it.
+#[inline(always)]
+pub(crate) fn depth_smoothing(z: f32, options: &Options) -> f32 {
+    if options.depth_dependent_smoothing {
+        options.normal_smoothing_size + z / 10.0
+    } else {
+        options.normal_smoothing_size
+    }
+}
+
+/// The side of the window of a pixel at `z`, `distance` from the nearest depth change; 0 for no window.
+#[inline(always)]
+pub(crate) fn window_side(distance: f32, z: f32, options: &Options) -> u32 {
+    let smoothing = distance.min(depth_smoothing(z, options));
+    if smoothing > SMALLEST && z.is_finite() { smoothing.min(LARGEST) as u32 } else { 0 }
+}

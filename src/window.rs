@@ -1,0 +1,110 @@
+//! Windows and what becomes of them at the border of the image.
+
+use std::ops::Range;
+
+use crate::options::BorderPolicy;
+
+/// A rectangle of pixels inside the image.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Rect {
+    pub x: Range<usize>,
+    pub y: Range<usize>,
+}
+
+impl Rect {
+    pub fn pixels(&self) -> impl Iterator<Item = (usize, usize)> + use<'_> {
+        self.y.clone().flat_map(move |y| self.x.clone().map(move |x| (x, y)))
+    }
+
+    /// The part inside the image without its outermost rows and columns.
+    pub fn inside_frame(&self, image: &Image) -> Rect {
+        let clip = |range: &Range<usize>, size: usize| {
+            range.start.max(1)..range.end.min(size.saturating_sub(1))
+        };
+        Rect { x: clip(&self.x, image.width), y: clip(&self.y, image.height) }
+    }
+}
+
+/// The image's size and what windows do at its border.
+#[derive(Clone, Debug)]
+pub(crate) struct Image {
+    pub width: usize,
+    pub height: usize,
+    pub border_policy: BorderPolicy,
+}
+
+impl Image {
+    /// The rectangles that make up a window which may cross the border; a pixel in two of them counts twice.
+    ///
+    /// With [`BorderPolicy::Ignore`] the window is clipped (PCL reads out of bounds there).
+    pub fn rects(
+        &self,
+        start: (isize, isize),
+        size: (usize, usize),
+    ) -> impl Iterator<Item = Rect> + use<> {
+        let columns = fold(start.0, size.0, self.width, self.border_policy);
+        let rows = fold(start.1, size.1, self.height, self.border_policy);
+        rows.into_iter()
+            .flat_map(move |y| columns.clone().into_iter().map(move |x| Rect { x, y: y.clone() }))
+    }
+
+    /// A pixel that may lie outside the image, brought back inside: mirrored as PCL does, or clamped.
+    pub fn pixel(&self, x: isize, y: isize) -> (usize, usize) {
+        (
+            fold_pixel(x, self.width, self.border_policy),
+            fold_pixel(y, self.height, self.border_policy),
+        )
+    }
+}
+
+/// The one or two intervals of `0..limit` that `start..start + size` becomes; the second may be empty.
+///
+/// Mirrored as PCL's `sumArea`: about index 0 at the near border, and without the last index at the far one.
+/// What would still leave the image (a window larger than the image, where PCL reads out of bounds) is clipped.
+fn fold(start: isize, size: usize, limit: usize, policy: BorderPolicy) -> [Range<usize>; 2] {
+    let end = start + size as isize;
+    let last = limit as isize - 1;
+    let clip = |start: isize, end: isize| {
+        start.clamp(0, limit as isize) as usize..end.clamp(0, limit as isize) as usize
+    };
+    match policy {
+        BorderPolicy::Mirror if start < 0 => [clip(0, end), clip(0, -start)],
+        BorderPolicy::Mirror if end > last => [clip(start, last), clip(2 * last + 1 - end, last)],
+        _ => [clip(start, end), 0..0],
+    }
+}
+
+/// One coordinate of a single pixel, mirrored as PCL's AVERAGE_DEPTH_CHANGE does, or clamped.
+fn fold_pixel(at: isize, limit: usize, policy: BorderPolicy) -> usize {
+    let last = limit as isize - 1;
+    let at = match policy {
+        BorderPolicy::Mirror if at < 0 => -at,
+        BorderPolicy::Mirror if at > last => 2 * last + 1 - at,
+        _ => at,
+    };
+    at.clamp(0, last) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn mirrored_windows_are_folded_as_pcl_folds_them() {
+        let fold = |start, size| super::fold(start, size, 10, BorderPolicy::Mirror);
+        assert_eq!(fold(2, 5), [2..7, 0..0]);
+        assert_eq!(fold(-2, 5), [0..3, 0..2]);
+        assert_eq!(fold(4, 5), [4..9, 0..0]);
+        assert_eq!(fold(5, 5), [5..9, 9..9]);
+        assert_eq!(fold(7, 5), [7..9, 7..9]);
+    }
+
+    #[test]
+    fn windows_larger_than_the_image_stay_inside() {
+        for policy in BorderPolicy::ALL {
+            for range in fold(-50, 100, 10, policy) {
+                assert!(range.end <= 10);
+            }
+        }
+    }
+}
