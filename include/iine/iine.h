@@ -244,20 +244,11 @@ typedef struct iine_maps {
   float *smoothing_areas;
 } iine_maps;
 
-/**
- * Every error, in the order of the numbers.
- */
-#define Error_ALL { NullPointer, StructSize, Size, Stride, Misaligned, Overlap, OptionValue, Unsupported, Index, OutOfMemory, Threads, Internal, }
 
-/**
- * Every method, in the order of the numbers.
- */
-#define Method_ALL { CovarianceMatrix, Average3DGradient, AverageDepthChange, Simple3DGradient, }
 
-/**
- * Every policy, in the order of the numbers.
- */
-#define BorderPolicy_ALL { Ignore, Mirror, }
+
+
+
 
 #ifdef __cplusplus
 extern "C" {
