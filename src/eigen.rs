@@ -28,9 +28,15 @@ impl Symmetric3 {
 }
 
 /// The smallest eigenvalue of a positive semidefinite matrix that is not zero, and its unit eigenvector.
+pub(crate) fn smallest_eigenpair(m: &Symmetric3) -> (f64, [f64; 3]) {
+    let (values, vector) = eigen(m);
+    (values[0], vector)
+}
+
+/// The eigenvalues of a positive semidefinite matrix, ascending, and the unit eigenvector of the first.
 ///
 /// Cyclic Jacobi rotations: slow, and right to the last bits whatever the eigenvalues are.
-pub(crate) fn smallest_eigenpair(m: &Symmetric3) -> (f64, [f64; 3]) {
+pub(crate) fn eigen(m: &Symmetric3) -> ([f64; 3], [f64; 3]) {
     let mut a = [[m.xx, m.xy, m.xz], [m.xy, m.yy, m.yz], [m.xz, m.yz, m.zz]];
     let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     const SWEEPS: usize = 12; // convergence is quadratic: 5 or 6 are enough
@@ -54,6 +60,8 @@ pub(crate) fn smallest_eigenpair(m: &Symmetric3) -> (f64, [f64; 3]) {
             }
         }
     }
-    let smallest = (0..3).min_by(|&i, &j| a[i][i].total_cmp(&a[j][j])).unwrap_or(0);
-    (a[smallest][smallest].max(0.0), [v[0][smallest], v[1][smallest], v[2][smallest]])
+    let mut order = [0, 1, 2];
+    order.sort_by(|&i, &j| a[i][i].total_cmp(&a[j][j]));
+    let smallest = order[0];
+    (order.map(|i| a[i][i].max(0.0)), [v[0][smallest], v[1][smallest], v[2][smallest]])
 }

@@ -53,6 +53,14 @@ impl Estimator {
             return Err(Error::Size);
         }
         normals.check_disjoint(points)?;
+        if self.options.is_beyond_pcl() {
+            for (at, estimate) in self.estimates(points).into_iter().enumerate() {
+                let (x, y) = (at % points.width(), at / points.width());
+                // SAFETY: the sizes are equal, and no other thread is at work.
+                unsafe { normals.write(x, y, estimate.normal, estimate.curvature) };
+            }
+            return Ok(());
+        }
         let plain = Plain::new(points, &self.options);
         for y in 0..points.height() {
             for x in 0..points.width() {
@@ -84,6 +92,15 @@ impl Estimator {
             return Err(Error::Index);
         }
         normals.check_disjoint(points)?;
+        if self.options.is_beyond_pcl() {
+            let estimates = self.estimates(points);
+            for (k, &index) in indices.iter().enumerate() {
+                let Estimate { normal, curvature } = estimates[index as usize];
+                // SAFETY: `normals` has an element for every index, and no other thread is at work.
+                unsafe { normals.write(k, 0, normal, curvature) };
+            }
+            return Ok(());
+        }
         let plain = Plain::new(points, &self.options);
         for (k, &index) in indices.iter().enumerate() {
             let (x, y) = (index as usize % points.width(), index as usize / points.width());
@@ -123,6 +140,16 @@ impl Estimator {
             }
         }
         Ok(())
+    }
+
+    /// All pixels' estimates where PCL's windows and sums alone are not what is asked for.
+    fn estimates(&self, points: &Points) -> Vec<Estimate> {
+        crate::paper::estimates(points, &self.options, |points| {
+            let plain = Plain::new(points, &self.options);
+            let pixels =
+                (0..points.height()).flat_map(|y| (0..points.width()).map(move |x| (x, y)));
+            pixels.map(|(x, y)| (plain.window_side(x, y) as usize, plain.estimate(x, y))).collect()
+        })
     }
 
     /// How much scratch memory is held, in bytes.

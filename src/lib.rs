@@ -34,6 +34,7 @@ mod isa;
 mod methods;
 mod options;
 mod orientation;
+mod paper;
 mod smoothing_area;
 mod window;
 
@@ -41,4 +42,4 @@ pub use cloud::{Normals, Points};
 pub use error::Error;
 pub use estimator::{Estimator, Maps};
 pub use isa::Isa;
-pub use options::{BorderPolicy, Method, Options};
+pub use options::{BorderPolicy, Depth, DistanceMetric, Method, Options, PaperOptions, Semantics};

@@ -48,6 +48,127 @@ impl BorderPolicy {
     pub const ALL: [BorderPolicy; 2] = [BorderPolicy::Ignore, BorderPolicy::Mirror];
 }
 
+/// Whose definition of the windows and of the methods' sums is followed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+#[repr(i32)]
+pub enum Semantics {
+    /// PCL's class, step by step; pixels get the answers that PCL gives.
+    #[default]
+    Pcl = 0,
+    /// The paper as published: windows by [`PaperOptions`], clipped at the border of the image, and sums over the
+    /// finite points in them. [`Method::AverageDepthChange`] is the paper's SDC, [`Method::CovarianceMatrix`] its
+    /// CM; [`Method::Simple3DGradient`] is not in the paper and not supported. The border policy, the smoothing
+    /// size and the depth change factor have no effect.
+    Paper = 1,
+}
+
+impl Semantics {
+    /// Both, in the order of the numbers.
+    pub const ALL: [Semantics; 2] = [Semantics::Pcl, Semantics::Paper];
+}
+
+/// How the distance to the nearest depth change is measured (the paper's T).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+#[repr(i32)]
+pub enum DistanceMetric {
+    /// Exact Euclidean distance.
+    #[default]
+    Euclidean = 0,
+    /// Borgefors' 3-4 chamfer distance, divided by 3: at most 8 % off.
+    Chamfer = 1,
+}
+
+impl DistanceMetric {
+    /// Both, in the order of the numbers.
+    pub const ALL: [DistanceMetric; 2] = [DistanceMetric::Euclidean, DistanceMetric::Chamfer];
+}
+
+/// What counts as a point's depth d in [`Semantics::Paper`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+#[repr(i32)]
+pub enum Depth {
+    /// z, for cameras.
+    #[default]
+    Z = 0,
+    /// The distance from the origin, for spinning LiDARs.
+    Range = 1,
+}
+
+impl Depth {
+    /// Both, in the order of the numbers.
+    pub const ALL: [Depth; 2] = [Depth::Z, Depth::Range];
+}
+
+/// The parameters of [`Semantics::Paper`]. Lengths are in the cloud's unit; the defaults are for a Kinect and metres.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct PaperOptions {
+    /// Smallest depth change that the sensor can tell, at depth d: f_DC(d) = alpha d^2 (Eq. 4). In 1/unit of length;
+    /// finite, above 0, default 0.0028, the paper's for a Kinect. See [`PaperOptions::alpha_of_sensor`].
+    pub alpha: f32,
+    /// Radius of the window over f_DC: B = beta f_DC(d) (Eq. 5). In pixels/unit of length; finite, above 0,
+    /// default 800: with the default alpha 5 px at 1.5 m, 9 px at 2 m.
+    pub beta: f32,
+    /// Neighbours whose depths differ by gamma f_DC(d) or more are a depth change apart (Eq. 6). Without unit;
+    /// finite, above 0, default 5.
+    pub gamma: f32,
+    /// Where R is below this, in pixels, there is no window. From 1 to `least_depth_radius`, default 2.
+    pub smallest_radius: u32,
+    /// B is at least this, in pixels: the noise of near points does not vanish with their depth. Up to
+    /// `largest_radius`, default 5.
+    pub least_depth_radius: u32,
+    /// B is at most this, in pixels. Up to 1000, default 20.
+    pub largest_radius: u32,
+    /// How T is measured; default [`DistanceMetric::Euclidean`].
+    pub distance_metric: DistanceMetric,
+    /// What a point's depth is; default [`Depth::Z`].
+    pub depth: Depth,
+}
+
+impl Default for PaperOptions {
+    fn default() -> Self {
+        PaperOptions {
+            alpha: 0.0028,
+            beta: 800.0,
+            gamma: 5.0,
+            smallest_radius: 2,
+            least_depth_radius: 5,
+            largest_radius: 20,
+            distance_metric: DistanceMetric::default(),
+            depth: Depth::default(),
+        }
+    }
+}
+
+impl PaperOptions {
+    /// The largest value that [`PaperOptions::largest_radius`] takes.
+    pub const LIMIT_RADIUS: u32 = 1000;
+
+    /// The alpha of a stereo or structured light sensor: its depth is focal * baseline / disparity, so that one
+    /// disparity step is a depth change of step / (focal * baseline) d^2.
+    ///
+    /// `disparity_step` and `focal` in pixels, `baseline` in the cloud's unit of length. A Kinect's 1/8 px, 580 px
+    /// and 0.075 m give 0.0029.
+    pub fn alpha_of_sensor(disparity_step: f32, focal: f32, baseline: f32) -> f32 {
+        disparity_step / (focal * baseline)
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        let positive = |number: f32| number.is_finite() && number > 0.0;
+        let in_range = positive(self.alpha)
+            && positive(self.beta)
+            && positive(self.gamma)
+            && self.smallest_radius >= 1
+            && self.smallest_radius <= self.least_depth_radius
+            && self.least_depth_radius <= self.largest_radius
+            && self.largest_radius <= Self::LIMIT_RADIUS;
+        if in_range { Ok(()) } else { Err(Error::OptionValue) }
+    }
+}
+
 /// The options of an [`Estimator`](crate::Estimator). Start from [`Options::default`], which is PCL's.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
@@ -70,6 +191,18 @@ pub struct Options {
     /// Worker threads: 1 (the default) computes on the calling thread, 0 takes one per core.
     /// The result does not depend on it, bit for bit.
     pub threads: usize,
+    /// Whose windows and sums; default [`Semantics::Pcl`].
+    pub semantics: Semantics,
+    /// The parameters of [`Semantics::Paper`].
+    pub paper: PaperOptions,
+    /// Takes points at (0, 0, 0) as missing, as LiDARs and some depth cameras write them; default off.
+    pub zero_is_missing: bool,
+    /// Gives pixels near a depth change a window of their own side, and with it a normal to every pixel that has
+    /// two neighbours on its surface not in line with it; default off.
+    pub one_sided_windows: bool,
+    /// In a second pass moves windows off the places where the normals of the first vary strongly, so that edges
+    /// without a depth change stay sharp; default off.
+    pub crease_windows: bool,
 }
 
 impl Default for Options {
@@ -82,6 +215,11 @@ impl Default for Options {
             max_depth_change_factor: 20.0 * 0.001,
             viewpoint: [0.0; 3],
             threads: 1,
+            semantics: Semantics::default(),
+            paper: PaperOptions::default(),
+            zero_is_missing: false,
+            one_sided_windows: false,
+            crease_windows: false,
         }
     }
 }
@@ -89,6 +227,12 @@ impl Default for Options {
 impl Options {
     /// Refuses what [`Estimator::compute`](crate::Estimator::compute) could not honour.
     pub fn check(&self) -> Result<(), Error> {
+        if self.semantics == Semantics::Paper {
+            if self.method == Method::Simple3DGradient {
+                return Err(Error::Unsupported);
+            }
+            return self.paper.check();
+        }
         if !(self.normal_smoothing_size.is_finite() && self.normal_smoothing_size > 0.0) {
             return Err(Error::OptionValue);
         }
@@ -96,6 +240,14 @@ impl Options {
             return Err(Error::Unsupported);
         }
         Ok(())
+    }
+
+    /// Whether more than PCL's windows and sums is asked for.
+    pub(crate) fn is_beyond_pcl(&self) -> bool {
+        self.semantics != Semantics::Pcl
+            || self.zero_is_missing
+            || self.one_sided_windows
+            || self.crease_windows
     }
 
     /// `BORDER_POLICY_IGNORE`: how many rows and columns at each border get no normal.

@@ -1,0 +1,57 @@
+//! Ways of using the library that are compared.
+
+use iine::{Error, Estimator, Method, Normals, Options, Points, Semantics};
+
+/// A named set of options.
+#[derive(Clone, Debug)]
+pub struct Mode {
+    /// Semantics, method and extras, as the tables print them.
+    pub name: String,
+    /// The options.
+    pub options: Options,
+}
+
+/// A short name of a method.
+pub fn method_name(method: Method, semantics: Semantics) -> &'static str {
+    match (method, semantics) {
+        (Method::CovarianceMatrix, Semantics::Paper) => "CM",
+        (Method::AverageDepthChange, Semantics::Paper) => "SDC",
+        (Method::Average3DGradient, Semantics::Paper) => "3DG",
+        (Method::CovarianceMatrix, _) => "pcl-COV",
+        (Method::AverageDepthChange, _) => "pcl-ADC",
+        (Method::Average3DGradient, _) => "pcl-A3G",
+        (_, _) => "pcl-S3G",
+    }
+}
+
+impl Mode {
+    /// A mode with one-sided windows (`o`) and crease windows (`c`) on or off.
+    pub fn new(semantics: Semantics, method: Method, one_sided: bool, creases: bool) -> Self {
+        let mut options = Options::default();
+        options.semantics = semantics;
+        options.method = method;
+        options.one_sided_windows = one_sided;
+        options.crease_windows = creases;
+        let mut name = method_name(method, semantics).to_owned();
+        if one_sided {
+            name += "+o";
+        }
+        if creases {
+            name += "+c";
+        }
+        Mode { name, options }
+    }
+
+    /// Normals of an organized cloud, row by row; NaN where there is none.
+    ///
+    /// Errors: as [`Estimator::compute`].
+    pub fn normals(&self, points: &[[f32; 3]], width: usize) -> Result<Vec<[f32; 3]>, Error> {
+        let height = points.len() / width;
+        let mut normals = vec![[f32::NAN; 3]; points.len()];
+        Estimator::new(self.options.clone()).compute(
+            &Points::interleaved(points.as_flattened(), width, height, 3, 0)?,
+            &mut Normals::interleaved(normals.as_flattened_mut(), width, height, 3, 0, None)?,
+        )?;
+        Ok(normals)
+    }
+}

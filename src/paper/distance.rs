@@ -1,0 +1,140 @@
+//! Step 2: the distance transform map (the paper's T): how far the nearest depth change is, in pixels.
+
+use crate::options::DistanceMetric;
+
+/// The distance map of a depth change map; infinite everywhere if there is no change.
+pub(crate) fn distance_map(
+    changes: &[bool],
+    width: usize,
+    height: usize,
+    metric: DistanceMetric,
+) -> Vec<f32> {
+    match metric {
+        DistanceMetric::Euclidean => euclidean(changes, width, height),
+        DistanceMetric::Chamfer => chamfer(changes, width, height),
+    }
+}
+
+/// Exact, in linear time (Meijster, Roerdink and Hesselink, *A General Algorithm for Computing Distance Transforms in
+/// Linear Time*, 2000): distances along the columns, then for every row the lower envelope of their parabolas.
+fn euclidean(changes: &[bool], width: usize, height: usize) -> Vec<f32> {
+    // Farther than any pixel, with a square that still fits.
+    let far = (width + height) as i64;
+    let mut columns = vec![far; width * height];
+    for at in 0..width * height {
+        if changes[at] {
+            columns[at] = 0;
+        } else if at >= width {
+            columns[at] = (columns[at - width] + 1).min(far);
+        }
+    }
+    for at in (0..width * (height - 1)).rev() {
+        columns[at] = columns[at].min(columns[at + width] + 1);
+    }
+
+    let mut map = vec![f32::INFINITY; width * height];
+    // The parabolas of the envelope: their columns, and from which column on each is the lowest.
+    let mut envelope: Vec<(i64, i64)> = Vec::with_capacity(width);
+    for (row, distances) in columns.chunks_exact(width).zip(map.chunks_exact_mut(width)) {
+        let height_at = |x: i64, i: i64| (x - i) * (x - i) + row[i as usize] * row[i as usize];
+        envelope.clear();
+        for i in (0..width as i64).filter(|i| row[*i as usize] < far) {
+            let mut from = 0;
+            while let Some(&(last, last_from)) = envelope.last() {
+                if height_at(last_from, last) > height_at(last_from, i) {
+                    envelope.pop();
+                    continue;
+                }
+                let (a, b) = (row[last as usize], row[i as usize]);
+                from = (i * i - last * last + b * b - a * a).div_euclid(2 * (i - last)) + 1;
+                break;
+            }
+            if from < width as i64 {
+                envelope.push((i, from));
+            }
+        }
+        let mut end = width as i64;
+        while let Some((i, from)) = envelope.pop() {
+            for x in from..end {
+                distances[x as usize] = (height_at(x, i) as f32).sqrt();
+            }
+            end = end.min(from);
+        }
+    }
+    map
+}
+
+/// Two passes with weights 3 and 4 (Borgefors, *Distance Transformations in Digital Images*, 1986), over 3.
+fn chamfer(changes: &[bool], width: usize, height: usize) -> Vec<f32> {
+    const STRAIGHT: u32 = 3;
+    const DIAGONAL: u32 = 4;
+    const FAR: u32 = u32::MAX / 2;
+    let mut map: Vec<u32> = changes.iter().map(|&change| if change { 0 } else { FAR }).collect();
+    let relax = |map: &mut [u32], x: usize, y: usize, backward: bool| {
+        let step = |dx: isize, dy: isize, weight: u32, map: &[u32]| {
+            let sign = if backward { -1 } else { 1 };
+            let nx = x.checked_add_signed(sign * dx).filter(|nx| *nx < width);
+            let ny = y.checked_add_signed(sign * dy).filter(|ny| *ny < height);
+            nx.zip(ny).map_or(FAR, |(nx, ny)| map[ny * width + nx] + weight)
+        };
+        let nearest = step(-1, 0, STRAIGHT, map)
+            .min(step(0, -1, STRAIGHT, map))
+            .min(step(-1, -1, DIAGONAL, map))
+            .min(step(1, -1, DIAGONAL, map));
+        map[y * width + x] = map[y * width + x].min(nearest);
+    };
+    for at in 0..width * height {
+        relax(&mut map, at % width, at / width, false);
+    }
+    for at in (0..width * height).rev() {
+        relax(&mut map, at % width, at / width, true);
+    }
+    let pixels = |value: u32| {
+        if value >= FAR { f32::INFINITY } else { value as f32 / STRAIGHT as f32 }
+    };
+    map.into_iter().map(pixels).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn changes(width: usize, height: usize, seed: usize) -> Vec<bool> {
+        (0..width * height).map(|i| (i * 7919 + seed * 104_729) % 97 < seed % 5).collect()
+    }
+
+    #[test]
+    fn euclidean_distances_are_exact() {
+        for (seed, (width, height)) in [(1, 1), (1, 9), (9, 1), (7, 5), (31, 23), (64, 48)]
+            .into_iter()
+            .enumerate()
+            .cycle()
+            .take(60)
+        {
+            let changes = changes(width, height, seed + width);
+            let found = euclidean(&changes, width, height);
+            for at in 0..width * height {
+                let squared = (0..width * height)
+                    .filter(|other| changes[*other])
+                    .map(|other| {
+                        (at % width).abs_diff(other % width).pow(2)
+                            + (at / width).abs_diff(other / width).pow(2)
+                    })
+                    .min();
+                let expected = squared.map_or(f32::INFINITY, |squared| (squared as f32).sqrt());
+                assert_eq!(found[at], expected);
+            }
+        }
+    }
+
+    #[test]
+    fn chamfer_distances_are_within_eight_percent() {
+        let (width, height) = (64, 48);
+        let changes = changes(width, height, 1);
+        let pairs =
+            euclidean(&changes, width, height).into_iter().zip(chamfer(&changes, width, height));
+        for (exact, chamfer) in pairs {
+            assert!((chamfer - exact).abs() <= 0.081 * exact, "{chamfer} for {exact}");
+        }
+    }
+}

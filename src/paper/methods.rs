@@ -1,0 +1,123 @@
+//! Step 4: a normal from the points in a rectangle. Plain forms, walking over it; sums over finite points only.
+
+use super::cloud::Cloud;
+use crate::eigen::{Symmetric3, eigen};
+use crate::methods::{Estimate, normal_of_tangents};
+use crate::options::Method;
+use crate::window::Rect;
+
+/// The estimate of a method of the paper.
+pub(crate) fn estimate(method: Method, cloud: &Cloud, rect: &Rect) -> Estimate {
+    match method {
+        Method::AverageDepthChange => smoothed_depth_changes(cloud, rect),
+        Method::Average3DGradient => gradients(cloud, rect),
+        Method::CovarianceMatrix => plane_of(cloud.finite(rect)).map_or(Estimate::NONE, |p| p.0),
+        Method::Simple3DGradient => Estimate::NONE,
+    }
+}
+
+/// CM (Eq. 16-25): the eigenvector of the smallest eigenvalue of the points' covariance matrix, that eigenvalue over
+/// the trace as curvature, and the matrix's eigenvalues, ascending. None if the points are on one line.
+pub(crate) fn plane_of(points: impl Iterator<Item = [f64; 3]>) -> Option<(Estimate, [f64; 3])> {
+    let points: Vec<[f64; 3]> = points.collect();
+    let count = points.len() as f64;
+    let mut mean = [0.0; 3];
+    for point in &points {
+        for i in 0..3 {
+            mean[i] += point[i] / count;
+        }
+    }
+    let mut covariance = Symmetric3::default();
+    for point in &points {
+        covariance.add_outer([point[0] - mean[0], point[1] - mean[1], point[2] - mean[2]]);
+    }
+    let (values, vector) = eigen(&covariance);
+    let trace = covariance.trace();
+    // Rounding keeps points on a line from a middle eigenvalue of exactly 0.
+    const LINE: f64 = 1e-12;
+    if points.len() < 3 || values[1] <= LINE * trace {
+        return None;
+    }
+    let estimate =
+        Estimate { normal: vector.map(|c| c as f32), curvature: (values[0] / trace) as f32 };
+    Some((estimate, values.map(|value| value / count)))
+}
+
+/// The 3-D gradient method: the cross product of the mean central differences of the points.
+fn gradients(cloud: &Cloud, rect: &Rect) -> Estimate {
+    let horizontal = mean_difference(cloud, rect, (1, 0));
+    let vertical = mean_difference(cloud, rect, (0, 1));
+    match horizontal.zip(vertical) {
+        Some((horizontal, vertical)) => normal_of_tangents(vertical, horizontal),
+        None => Estimate::NONE,
+    }
+}
+
+/// SDC (Eq. 9-15): tangents whose x and y are differences of the outermost points of the middle row or column, and
+/// whose z is the mean central difference of the depths.
+///
+/// In a whole window of radius r the difference of the means over radius r - 1 around (m + 1, n) and (m - 1, n) in
+/// Eq. 12 is the mean of z(m + 1, n) - z(m - 1, n) over radius r - 1 around (m, n); said so, it stays right where
+/// points are missing. As printed, x and y span 2r pixels where z spans 2, which tilts every normal but a frontal
+/// one; here z is extended to the pixels that x and y span.
+fn smoothed_depth_changes(cloud: &Cloud, rect: &Rect) -> Estimate {
+    let (column, row) = (middle(&rect.x), middle(&rect.y));
+    let horizontal = {
+        let finite = |x: &usize| !cloud.is_missing(cloud.index(*x, row));
+        let span = rect.x.clone().find(finite).zip(rect.x.clone().rev().find(finite));
+        tangent(cloud, rect, span.map(|(from, to)| ((from, row), (to, row), to - from)), (1, 0))
+    };
+    let vertical = {
+        let finite = |y: &usize| !cloud.is_missing(cloud.index(column, *y));
+        let span = rect.y.clone().find(finite).zip(rect.y.clone().rev().find(finite));
+        tangent(
+            cloud,
+            rect,
+            span.map(|(from, to)| ((column, from), (column, to), to - from)),
+            (0, 1),
+        )
+    };
+    match horizontal.zip(vertical) {
+        Some((horizontal, vertical)) => normal_of_tangents(vertical, horizontal),
+        None => Estimate::NONE,
+    }
+}
+
+/// Two pixels of a row or column, and how far apart they are.
+type Span = ((usize, usize), (usize, usize), usize);
+
+/// The tangent over a span: x and y from its ends, z from the mean difference across two pixels.
+fn tangent(
+    cloud: &Cloud,
+    rect: &Rect,
+    span: Option<Span>,
+    step: (usize, usize),
+) -> Option<[f64; 3]> {
+    let (from, to, length) = span.filter(|(.., length)| *length > 0)?;
+    let slope = mean_difference(cloud, rect, step)?[2] / 2.0;
+    let (from, to) = (cloud.at(from.0, from.1), cloud.at(to.0, to.1));
+    let difference = |i: usize| f64::from(to[i]) - f64::from(from[i]);
+    Some([difference(0), difference(1), slope * length as f64])
+}
+
+/// The mean of P(m + step) - P(m - step) over the pixels m inside the rectangle's outermost rows and columns, where
+/// both points are finite; none if there is no such pair.
+fn mean_difference(cloud: &Cloud, rect: &Rect, (dx, dy): (usize, usize)) -> Option<[f64; 3]> {
+    let inner = |range: &std::ops::Range<usize>| range.start + 1..range.end.saturating_sub(1);
+    let (mut sum, mut count) = ([0.0; 3], 0.0);
+    for (x, y) in (Rect { x: inner(&rect.x), y: inner(&rect.y) }).pixels() {
+        let (ahead, behind) = (cloud.at(x + dx, y + dy), cloud.at(x - dx, y - dy));
+        if ahead[2].is_nan() || behind[2].is_nan() {
+            continue;
+        }
+        for i in 0..3 {
+            sum[i] += f64::from(ahead[i]) - f64::from(behind[i]);
+        }
+        count += 1.0;
+    }
+    (count > 0.0).then(|| sum.map(|sum| sum / count))
+}
+
+fn middle(range: &std::ops::Range<usize>) -> usize {
+    (range.start + range.end - 1) / 2
+}

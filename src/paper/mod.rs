@@ -1,0 +1,231 @@
+//! The paper's own windows and methods, and what its conclusion leaves open: one-sided windows near depth changes
+//! and a second pass near creases, both also on top of PCL's windows.
+//!
+//! One file per step, in its plain form. What the steps share is that a pixel's window is a rectangle inside the
+//! image, and that a method turns the points in a rectangle into a normal.
+
+mod cloud;
+mod creases;
+mod depth_change;
+mod distance;
+mod methods;
+mod one_sided;
+mod smoothing_area;
+mod summed_area;
+
+use cloud::Cloud;
+use depth_change::DepthChanges;
+use summed_area::SummedArea;
+
+use crate::cloud::Points;
+use crate::methods::{self as pcl, Estimate};
+use crate::options::{BorderPolicy, Method, Options, Semantics};
+use crate::orientation::turn_to_viewpoint;
+use crate::window::{Image, Rect};
+
+/// A pixel's window, and the side it would have far from any depth change.
+#[derive(Clone)]
+struct Window {
+    rect: Option<Rect>,
+    wanted_side: usize,
+}
+
+/// The maps of [`Semantics::Paper`], row by row.
+pub(crate) struct PaperMaps {
+    /// B in pixels; NaN at missing points.
+    pub depth_radii: Vec<f32>,
+    /// C.
+    pub depth_changes: Vec<bool>,
+    /// T in pixels.
+    pub distances: Vec<f32>,
+    /// R in pixels; 0 where there is no window.
+    pub smoothing_radii: Vec<f32>,
+}
+
+impl PaperMaps {
+    pub fn new(points: &Points, options: &Options) -> Self {
+        let cloud = Cloud::new(points, options);
+        let changes = depth_changes(&cloud, options);
+        Self::of(&cloud, &changes, options)
+    }
+
+    fn of(cloud: &Cloud, changes: &DepthChanges, options: &Options) -> Self {
+        let paper = &options.paper;
+        let depth_changes = changes.map();
+        let distances = distance::distance_map(
+            &depth_changes,
+            cloud.width,
+            cloud.height,
+            paper.distance_metric,
+        );
+        let depth_radii: Vec<f32> =
+            cloud.depths.iter().map(|depth| smoothing_area::depth_radius(*depth, paper)).collect();
+        let radius = |(&radius, &distance): (&f32, &f32)| {
+            if radius.is_nan() {
+                0.0
+            } else {
+                smoothing_area::smoothing_radius(radius, distance, paper)
+            }
+        };
+        let smoothing_radii = depth_radii.iter().zip(&distances).map(radius).collect();
+        PaperMaps { depth_radii, depth_changes, distances, smoothing_radii }
+    }
+}
+
+fn depth_changes(cloud: &Cloud, options: &Options) -> DepthChanges {
+    DepthChanges::find(cloud, |depth, difference, gap| {
+        is_depth_change(depth, difference, gap, options)
+    })
+}
+
+/// Whether depths that differ by `difference` between pixels `gap` apart are a depth change apart.
+fn is_depth_change(depth: f32, difference: f32, gap: usize, options: &Options) -> bool {
+    match options.semantics {
+        Semantics::Paper => smoothing_area::is_depth_change(depth, difference, gap, &options.paper),
+        Semantics::Pcl => {
+            let threshold = crate::depth_change::threshold(depth, options.max_depth_change_factor);
+            difference.abs() > threshold * gap as f32
+        }
+    }
+}
+
+/// The estimates of all pixels, row by row, turned to the viewpoint; `plain` gives the windows and estimates of the
+/// PCL semantics, on the same points.
+pub(crate) fn estimates(
+    points: &Points,
+    options: &Options,
+    plain_pcl: impl Fn(&Points) -> Vec<(usize, Estimate)>,
+) -> Vec<Estimate> {
+    let cloud = Cloud::new(points, options);
+    let (width, height) = (cloud.width, cloud.height);
+    let pixels = || (0..width * height).map(|at| (at, (at % width, at / width)));
+    let cleaned = Points::interleaved(cloud.points.as_flattened(), width, height, 3, 0)
+        .expect("a packed copy of a valid cloud");
+    let oriented = |estimate: Estimate, at: usize| {
+        let normal = turn_to_viewpoint(estimate.normal, cloud.points[at], options.viewpoint);
+        Estimate { normal, ..estimate }
+    };
+    let of_rect = |rect: &Rect, at: usize| {
+        let estimate = match options.semantics {
+            Semantics::Paper => methods::estimate(options.method, &cloud, rect),
+            Semantics::Pcl => {
+                let side = rect.x.len().max(rect.y.len());
+                let center = (rect.x.start + side / 2, rect.y.start + side / 2);
+                let image = Image { width, height, border_policy: BorderPolicy::Ignore };
+                let center = (center.0.min(width - 1), center.1.min(height - 1));
+                pcl::estimate(options.method, &cleaned, &image, center, side)
+            }
+        };
+        oriented(estimate, at)
+    };
+
+    let changes = depth_changes(&cloud, options);
+    let (mut windows, mut estimates): (Vec<Window>, Vec<Estimate>) = match options.semantics {
+        Semantics::Paper => {
+            let maps = PaperMaps::of(&cloud, &changes, options);
+            pixels()
+                .map(|(at, pixel)| {
+                    let radius = maps.smoothing_radii[at];
+                    let rect = (radius > 0.0)
+                        .then(|| smoothing_area::window(pixel, radius as usize, width, height));
+                    let wanted_side = match maps.depth_radii[at] {
+                        radius if radius.is_nan() => 0,
+                        radius => 2 * radius as usize + 1,
+                    };
+                    let estimate = rect.as_ref().map_or(Estimate::NONE, |rect| of_rect(rect, at));
+                    (Window { rect, wanted_side }, estimate)
+                })
+                .unzip()
+        }
+        Semantics::Pcl => plain_pcl(&cleaned)
+            .into_iter()
+            .zip(pixels())
+            .map(|((side, estimate), (at, (x, y)))| {
+                let range = |at: usize, size: usize| {
+                    let start = at.saturating_sub(side / 2);
+                    start..(start + side).min(size)
+                };
+                let rect = (side > 0).then(|| Rect { x: range(x, width), y: range(y, height) });
+                let z = cloud.points[at][2];
+                let wanted = crate::smoothing_area::window_side(f32::INFINITY, z, options);
+                (Window { rect, wanted_side: wanted as usize }, estimate)
+            })
+            .unzip(),
+    };
+    if !(options.one_sided_windows || options.crease_windows) {
+        return estimates;
+    }
+
+    let summed_changes = changes.summed();
+    let finite = SummedArea::new(width, height, |at| [u32::from(!cloud.is_missing(at))]);
+    let side = |rect: &Rect| rect.x.len().max(rect.y.len());
+    if options.one_sided_windows {
+        for (at, pixel) in pixels().filter(|(at, _)| !cloud.is_missing(*at)) {
+            let Window { rect, wanted_side } = &windows[at];
+            if rect.as_ref().is_some_and(|rect| side(rect) >= *wanted_side) {
+                continue;
+            }
+            let found = one_sided::window(&cloud, &summed_changes, &finite, pixel, *wanted_side);
+            if let Some(rect) = found {
+                estimates[at] = of_rect(&rect, at);
+                windows[at].rect = Some(rect);
+            }
+        }
+    }
+    if options.crease_windows {
+        let normals = creases::SummedNormals::new(&estimates, width, height);
+        for (at, pixel) in pixels() {
+            let Some(rect) = &windows[at].rect else { continue };
+            if let Some(rect) = creases::window(
+                &cloud,
+                &normals,
+                &summed_changes,
+                pixel,
+                rect,
+                f64::from(options.paper.alpha),
+            ) {
+                let second = of_rect(&rect, at);
+                if !second.normal[0].is_nan() {
+                    estimates[at] = second;
+                }
+            }
+        }
+    }
+    if options.one_sided_windows {
+        let good = |at: usize| {
+            let Window { rect, wanted_side } = &windows[at];
+            rect.as_ref().is_some_and(|rect| 2 * side(rect) > *wanted_side)
+        };
+        let first = estimates.clone();
+        let usable = |at: usize| good(at) && !first[at].normal[0].is_nan();
+        for (at, pixel) in pixels().filter(|(at, _)| !cloud.is_missing(*at) && !usable(*at)) {
+            let depth = cloud.depths[at];
+            let tolerance = one_sided_tolerance(depth, options);
+            let same = |depth: f32, difference: f32, distance: usize| {
+                !is_depth_change(depth, difference, distance.max(1), options)
+            };
+            let found = one_sided::adopted(&cloud, &first, usable, pixel, tolerance)
+                .or_else(|| (!first[at].normal[0].is_nan()).then_some(first[at]))
+                .or_else(|| one_sided::plane_around(&cloud, pixel, same));
+            if let Some(found) = found {
+                estimates[at] = oriented(found, at);
+            }
+        }
+    }
+    let curvature = options.method == Method::CovarianceMatrix;
+    if !curvature {
+        estimates.iter_mut().for_each(|estimate| estimate.curvature = f32::NAN);
+    }
+    estimates
+}
+
+/// How far from a tangent plane a point at a depth may lie to be on that surface: half a depth change.
+fn one_sided_tolerance(depth: f32, options: &Options) -> f64 {
+    let change = match options.semantics {
+        Semantics::Paper => {
+            options.paper.gamma * smoothing_area::smallest_depth_change(depth, &options.paper)
+        }
+        Semantics::Pcl => crate::depth_change::threshold(depth, options.max_depth_change_factor),
+    };
+    f64::from(change) / 2.0
+}
