@@ -37,6 +37,7 @@ mod options;
 mod orientation;
 mod simd;
 mod smoothing_area;
+mod threads;
 mod window;
 
 pub use cloud::{Normals, Points};

@@ -146,7 +146,9 @@ unsafe fn transpose4(from: *const f32, from_stride: usize, to: *mut f32, to_stri
     for row in 0..4 {
         for column in 0..4 {
             // SAFETY: promised by the caller.
-            unsafe { to.add(column * to_stride + row).write(from.add(row * from_stride + column).read()) };
+            unsafe {
+                to.add(column * to_stride + row).write(from.add(row * from_stride + column).read())
+            };
         }
     }
 }

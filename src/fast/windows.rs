@@ -59,9 +59,9 @@ pub(crate) fn row_length(width: usize) -> usize {
 /// Reads a row's depths in lane order; the last element holds the following segments' first pixels.
 #[inline(always)]
 fn read_z(points: &Points, order: LaneOrder, y: usize, z: &mut [Lanes]) {
-    let (grid, [_, _, row]) = points.row(y);
+    let (row, stride) = points.z_row(y);
     // SAFETY: row y is inside the cloud, so it has a depth at every x below the width.
-    unsafe { order.read(row, grid.point_stride, z) };
+    unsafe { order.read(row, stride, z) };
     let first = z[0];
     z[order.segment] =
         Lanes(std::array::from_fn(|l| if l + 1 < LANES { first.0[l + 1] } else { 0.0 }));
@@ -86,7 +86,8 @@ impl<'a> WindowRows<'a> {
         self.rows[index * length..(index + 2) * length].split_at_mut(length)
     }
 
-    /// Depth changes and the forward pass over the image's rows `first..first + count`, downwards.
+    /// Depth changes and the forward pass over the image's rows `first..first + count`, downwards. Returns the largest
+    /// magnitude of a finite depth in them.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
@@ -97,15 +98,16 @@ impl<'a> WindowRows<'a> {
         options: &Options,
         (first, count): (usize, usize),
         sweep: &mut Sweep,
-    ) {
+    ) -> f32 {
         let order = self.order;
         sweep.resize(order);
+        let mut largest = 0.0_f32;
         let far = far(points.width(), points.height());
         if first > 0 {
             read_z(points, order, first - 1, &mut sweep.z);
             read_z(points, order, first, &mut sweep.z_below);
             // SAFETY: as the caller's.
- unsafe { sweep.test_below::<S>(options.max_depth_change_factor) };
+            unsafe { sweep.test_below::<S>(options.max_depth_change_factor) };
             std::mem::swap(&mut sweep.below, &mut sweep.above);
             std::mem::swap(&mut sweep.z, &mut sweep.z_below);
         } else {
@@ -116,24 +118,27 @@ impl<'a> WindowRows<'a> {
             if y + 1 < points.height() {
                 read_z(points, order, y + 1, &mut sweep.z_below);
                 // SAFETY: as the caller's.
- unsafe { sweep.test_below::<S>(options.max_depth_change_factor) };
+                unsafe { sweep.test_below::<S>(options.max_depth_change_factor) };
                 // SAFETY: as the caller's.
- unsafe { sweep.test_right::<S>(options.max_depth_change_factor) };
+                unsafe { sweep.test_right::<S>(options.max_depth_change_factor) };
             } else {
                 sweep.below.fill(Lanes::ZERO);
                 sweep.right.fill(Lanes::ZERO);
             }
             // SAFETY: as the caller's.
- unsafe { sweep.start_distances::<S>(far, &mut self.row(index)[1..]) };
+            largest = largest.max(unsafe { sweep.largest_z::<S>() });
+            // SAFETY: as the caller's.
+            unsafe { sweep.start_distances::<S>(far, &mut self.row(index)[1..]) };
             if index > 0 {
                 let (above, row) = self.two_rows(index - 1);
                 // SAFETY: as the caller's.
- unsafe { forward::<S>(order, above, row) };
+                unsafe { forward::<S>(order, above, row) };
             }
             close_ends(self.row(index), far);
             std::mem::swap(&mut sweep.below, &mut sweep.above);
             std::mem::swap(&mut sweep.z, &mut sweep.z_below);
         }
+        largest
     }
 
     /// The backward pass upwards over the swept rows, `first` being the image's row of the first; then the rows
@@ -155,21 +160,22 @@ impl<'a> WindowRows<'a> {
             if index + 1 < count {
                 let (row, below) = self.two_rows(index);
                 // SAFETY: as the caller's.
- unsafe { backward::<S>(order, row, below, far) };
+                unsafe { backward::<S>(order, row, below, far) };
                 close_ends(row, far);
                 // SAFETY: as the caller's.
- unsafe { sweep.sides::<S>(points, options, first + index + 1, order, below) };
+                unsafe { sweep.sides::<S>(points, options, first + index + 1, order, below) };
             }
         }
         // SAFETY: as the caller's.
- unsafe { sweep.sides::<S>(points, options, first, order, self.row(0)) };
+        unsafe { sweep.sides::<S>(points, options, first, order, self.row(0)) };
     }
+}
 
-    /// The sides of the windows of one of the swept rows, after [`WindowRows::sweep_up`].
-    pub fn sides(&self, index: usize) -> &[f32] {
-        let length = self.order.segment + 2;
-        &floats(&self.rows[index * length..(index + 1) * length])[..self.order.width]
-    }
+/// The sides of the windows of a row, after [`WindowRows::sweep_up`], and more that means nothing: the width rounded
+/// up to a multiple of 16, at least.
+pub(crate) fn sides(rows: &[Lanes], width: usize, index: usize) -> &[f32] {
+    let length = row_length(width);
+    floats(&rows[index * length..(index + 1) * length])
 }
 
 fn floats(row: &[Lanes]) -> &[f32] {
@@ -221,7 +227,8 @@ impl Sweep {
     #[inline(always)]
     unsafe fn test_right<S: Simd>(&mut self, factor: f32) {
         let length = self.right.len();
-        let (z, tested, right) = (&self.z[..length], &self.tested[..length], &mut self.right[..length]);
+        let (z, tested, right) =
+            (&self.z[..length], &self.tested[..length], &mut self.right[..length]);
         for k in 0..length - 1 {
             // SAFETY: as the caller's.
             unsafe {
@@ -235,6 +242,27 @@ impl Sweep {
         }
     }
 
+    /// The largest magnitude of a finite depth in the row.
+    ///
+    /// # Safety
+    /// As [`Sweep::test_below`].
+    #[inline(always)]
+    unsafe fn largest_z<S: Simd>(&self) -> f32 {
+        let mut lanes = Lanes::ZERO;
+        // SAFETY: as the caller's.
+        unsafe {
+            let mut largest = lanes.load::<S>();
+            for z in &self.z {
+                let z = z.load::<S>();
+                for g in 0..2 {
+                    largest[g] = S::max(S::and(S::finite(z[g]), S::abs(z[g])), largest[g]);
+                }
+            }
+            lanes.store::<S>(largest);
+        }
+        lanes.0.into_iter().fold(0.0, f32::max)
+    }
+
     /// Distance 0 at depth changes, `far` elsewhere.
     ///
     /// # Safety
@@ -242,14 +270,16 @@ impl Sweep {
     #[inline(always)]
     unsafe fn start_distances<S: Simd>(&self, far: f32, row: &mut [Lanes]) {
         let segment = self.right.len() - 1;
-        let (right, below, above) = (&self.right[..segment], &self.below[..segment], &self.above[..segment]);
+        let (right, below, above) =
+            (&self.right[..segment], &self.below[..segment], &self.above[..segment]);
         let row = &mut row[..segment];
         // SAFETY: as the caller's.
         unsafe {
             let far = S::splat(far);
             let mut left = right[segment - 1].next_lane(0.0).load::<S>();
             for k in 0..segment {
-                let (own, below, above) = (right[k].load::<S>(), below[k].load::<S>(), above[k].load::<S>());
+                let (own, below, above) =
+                    (right[k].load::<S>(), below[k].load::<S>(), above[k].load::<S>());
                 let change = |g: usize| S::or(S::or(own[g], left[g]), S::or(below[g], above[g]));
                 row[k].store::<S>([S::and_not(change(0), far), S::and_not(change(1), far)]);
                 left = own;
@@ -274,7 +304,8 @@ impl Sweep {
         if options.depth_dependent_smoothing {
             read_z(points, order, y, &mut self.z);
         }
-        let (distances, z, sides) = (&row[1..=segment], &self.z[..segment], &mut self.sides[..segment]);
+        let (distances, z, sides) =
+            (&row[1..=segment], &self.z[..segment], &mut self.sides[..segment]);
         // SAFETY: as the caller's; the sides fit i32.
         unsafe {
             let size = S::splat(options.normal_smoothing_size);
@@ -288,7 +319,11 @@ impl Sweep {
                 let distances = distances[k].load::<S>();
                 let z = z[k].load::<S>();
                 let smoothing = |g: usize| {
-                    if options.depth_dependent_smoothing { S::add(size, S::div(z[g], ten)) } else { size }
+                    if options.depth_dependent_smoothing {
+                        S::add(size, S::div(z[g], ten))
+                    } else {
+                        size
+                    }
                 };
                 sides[k].store::<S>([
                     side(distances[0], smoothing(0)),
@@ -437,8 +472,8 @@ fn wrap(order: LaneOrder, row: &mut [Lanes], x: usize, from: usize) {
 mod tests {
     use super::*;
     use crate::depth_change::depth_change_map;
-    use crate::simd::portable::Portable;
     use crate::distance::distance_map;
+    use crate::simd::portable::Portable;
     use crate::smoothing_area::window_side;
 
     /// Depths with steps and holes, the same for the same seed.
@@ -479,14 +514,16 @@ mod tests {
                 let mut windows = WindowRows::new(width, &mut rows);
                 let mut sweep = Sweep::default();
                 // SAFETY: the portable path runs everywhere.
- unsafe { windows.sweep_down::<Portable>(&points, &options, (0, height), &mut sweep);
-                windows.sweep_up::<Portable>(&points, &options, (0, height), &mut sweep);}
+                unsafe {
+                    windows.sweep_down::<Portable>(&points, &options, (0, height), &mut sweep);
+                    windows.sweep_up::<Portable>(&points, &options, (0, height), &mut sweep);
+                }
                 for y in 0..height {
                     for x in 0..width {
                         let expected =
                             window_side(distances[y * width + x], points.z(x, y), &options);
                         assert_eq!(
-                            windows.sides(y)[x],
+                            sides(&rows, width, y)[x],
                             expected as f32,
                             "{width}x{height} {x},{y}"
                         );
@@ -496,4 +533,3 @@ mod tests {
         }
     }
 }
-

@@ -60,6 +60,8 @@ pub(crate) trait Simd: Copy {
     unsafe fn prefix_sum_i(a: Self::I) -> Self::I;
     /// Every lane takes the value of the last one.
     unsafe fn last_i(a: Self::I) -> Self::I;
+    /// `lanes` bit l ? yes : no
+    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I;
     /// Nearest integers, ties to even; the value must fit.
     unsafe fn round_i(a: Self::F) -> Self::I;
     /// Integers towards zero; the value must fit.
@@ -118,9 +120,25 @@ pub(crate) trait Simd: Copy {
     /// The mask whose lane l is bit l.
     #[inline(always)]
     unsafe fn mask(bits: u32) -> Self::F {
-        let lane = |l: u32| f32::from_bits(if bits >> l & 1 != 0 { !0 } else { 0 });
-        let lanes: [f32; GROUP] = std::array::from_fn(|l| lane(l as u32));
         // SAFETY: as the caller's; a load of a whole group.
-        unsafe { Self::load(lanes.as_ptr()) }
+        unsafe { Self::load(MASKS[(bits & 0xff) as usize].0.as_ptr()) }
     }
 }
+
+#[repr(C, align(32))]
+struct LaneMask([f32; GROUP]);
+
+/// The mask of every set of lanes.
+static MASKS: [LaneMask; 1 << GROUP] = {
+    let mut masks = [const { LaneMask([0.0; GROUP]) }; 1 << GROUP];
+    let mut bits = 0;
+    while bits < 1 << GROUP {
+        let mut lane = 0;
+        while lane < GROUP {
+            masks[bits].0[lane] = f32::from_bits(if bits >> lane & 1 != 0 { !0 } else { 0 });
+            lane += 1;
+        }
+        bits += 1;
+    }
+    masks
+};

@@ -10,7 +10,11 @@ type I = [i32; GROUP];
 type D = [f64; GROUP];
 
 #[inline(always)]
-fn zip<A: Copy, B: Copy, C: Copy + Default>(a: [A; GROUP], b: [B; GROUP], f: impl Fn(A, B) -> C) -> [C; GROUP] {
+fn zip<A: Copy, B: Copy, C: Copy + Default>(
+    a: [A; GROUP],
+    b: [B; GROUP],
+    f: impl Fn(A, B) -> C,
+) -> [C; GROUP] {
     let mut lanes = [C::default(); GROUP];
     for l in 0..GROUP {
         lanes[l] = f(a[l], b[l]);
@@ -149,6 +153,14 @@ impl Simd for Portable {
     #[inline(always)]
     unsafe fn last_i(a: I) -> I {
         [a[GROUP - 1]; GROUP]
+    }
+    #[inline(always)]
+    unsafe fn select_i(bits: u32, yes: I, no: I) -> I {
+        let mut lanes = no;
+        for l in 0..GROUP {
+            lanes[l] = if bits >> l & 1 != 0 { yes[l] } else { no[l] };
+        }
+        lanes
     }
     #[inline(always)]
     unsafe fn round_i(a: F) -> I {

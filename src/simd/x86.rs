@@ -154,6 +154,14 @@ impl Simd for Sse2 {
         unsafe { [_mm_shuffle_epi32::<0xff>(a[1]); 2] }
     }
     #[inline(always)]
+    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
+        unsafe {
+            let mask = Self::mask(lanes);
+            let mask = [_mm_castps_si128(mask[0]), _mm_castps_si128(mask[1])];
+            each!(_mm_or_si128, each!(_mm_and_si128, mask, yes), each!(_mm_andnot_si128, mask, no))
+        }
+    }
+    #[inline(always)]
     unsafe fn round_i(a: Self::F) -> Self::I {
         unsafe { [_mm_cvtps_epi32(a[0]), _mm_cvtps_epi32(a[1])] }
     }
@@ -172,7 +180,14 @@ impl Simd for Sse2 {
     }
     #[inline(always)]
     unsafe fn load_d(from: *const f64) -> Self::D {
-        unsafe { [0, 2, 4, 6].map(|l| _mm_loadu_pd(from.add(l))) }
+        unsafe {
+            [
+                _mm_loadu_pd(from),
+                _mm_loadu_pd(from.add(2)),
+                _mm_loadu_pd(from.add(4)),
+                _mm_loadu_pd(from.add(6)),
+            ]
+        }
     }
     #[inline(always)]
     unsafe fn store_d(to: *mut f64, value: Self::D) {
@@ -224,12 +239,11 @@ impl Simd for Sse2 {
         unsafe {
             let mask = Self::mask(lanes);
             let mask = [
-                _mm_unpacklo_ps(mask[0], mask[0]),
-                _mm_unpackhi_ps(mask[0], mask[0]),
-                _mm_unpacklo_ps(mask[1], mask[1]),
-                _mm_unpackhi_ps(mask[1], mask[1]),
-            ]
-            .map(|half| _mm_castps_pd(half));
+                _mm_castps_pd(_mm_unpacklo_ps(mask[0], mask[0])),
+                _mm_castps_pd(_mm_unpackhi_ps(mask[0], mask[0])),
+                _mm_castps_pd(_mm_unpacklo_ps(mask[1], mask[1])),
+                _mm_castps_pd(_mm_unpackhi_ps(mask[1], mask[1])),
+            ];
             each!(_mm_or_pd, each!(_mm_and_pd, mask, yes), each!(_mm_andnot_pd, mask, no))
         }
     }
@@ -384,6 +398,10 @@ impl Simd for Avx2 {
     #[inline(always)]
     unsafe fn last_i(a: Self::I) -> Self::I {
         unsafe { _mm256_permutevar8x32_epi32(a, _mm256_set1_epi32(7)) }
+    }
+    #[inline(always)]
+    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
+        unsafe { _mm256_blendv_epi8(no, yes, _mm256_castps_si256(Self::mask(lanes))) }
     }
     #[inline(always)]
     unsafe fn round_i(a: Self::F) -> Self::I {
