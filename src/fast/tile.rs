@@ -231,22 +231,14 @@ impl Tile<'_> {
                     sink.write_none(x, y, lanes);
                     continue;
                 }
-                let (found, plain) = if hidden {
-                    (None, windows)
+                let mut normals = Octet::none();
+                let plain = if hidden {
+                    windows
                 } else {
                     let (of8, plain) =
                         self.group::<S, M>(frame, planes, sums, sides, (x, y), group, windows);
-                    match of8 {
-                        Some(of8) => {
-                            let found = sums.estimate::<S>(frame, &of8, group);
-                            let plain = plain | found.doubtful & windows;
-                            (Some(found), plain)
-                        }
-                        None => (None, plain),
-                    }
-                };
-                let mut normals = Octet::none();
-                if let Some(found) = found {
+                    let found = sums.estimate::<S>(frame, &of8, group);
+                    let plain = plain | found.doubtful & windows;
                     let column = frame.column(x);
                     let point = [
                         Floats(S::load(planes.row(frame, 0, y).as_ptr().add(column))),
@@ -254,17 +246,26 @@ impl Tile<'_> {
                         Floats(S::load(planes.row(frame, 2, y).as_ptr().add(column))),
                     ];
                     normals.set::<S>(&found, point, self.options.viewpoint, windows & !plain);
-                }
-                for lane in Bits(plain) {
-                    let side = row[x + lane] as usize;
-                    let found =
-                        estimate(self.options.method, self.points, self.image, (x + lane, y), side);
-                    let point = self.points.at(x + lane, y);
-                    let normal = turn_to_viewpoint(found.normal, point, self.options.viewpoint);
-                    normals.put(lane, Estimate { normal, ..found });
+                    plain
+                };
+                if plain != 0 {
+                    self.plain_lanes(&mut normals, &row[x..x + lanes], (x, y), plain);
                 }
                 sink.write(x, y, lanes, &normals);
             }
+        }
+    }
+
+    /// The normals of some of the lanes from `(x, y)` on, by the plain form.
+    #[cold]
+    fn plain_lanes(&self, normals: &mut Octet, sides: &[f32], (x, y): (usize, usize), lanes: u32) {
+        for lane in Bits(lanes) {
+            let pixel = (x + lane, y);
+            let side = sides[lane] as usize;
+            let found = estimate(self.options.method, self.points, self.image, pixel, side);
+            let point = self.points.at(x + lane, y);
+            let normal = turn_to_viewpoint(found.normal, point, self.options.viewpoint);
+            normals.put(lane, Estimate { normal, ..found });
         }
     }
 
@@ -283,10 +284,12 @@ impl Tile<'_> {
         (x, y): (usize, usize),
         group: S::F,
         windows: u32,
-    ) -> (Option<M::Of8<S>>, u32) {
+    ) -> (M::Of8<S>, u32) {
         let Image { width, height, .. } = *self.image;
         let row = sides(y);
-        let (mut of8, mut plain, mut todo) = (None, 0, windows);
+        // SAFETY: as the caller's.
+        let mut of8 = unsafe { M::none::<S>() };
+        let (mut plain, mut todo) = (0, windows);
         while todo != 0 {
             let first = todo.trailing_zeros() as usize;
             let side = row[x + first];
@@ -301,13 +304,10 @@ impl Tile<'_> {
             let inside = inside_row && y > half && y + rest < height;
             if inside {
                 // SAFETY: as the caller's; the frame holds `self.side` around every pixel of the tile.
-                of8 = Some(unsafe {
+                unsafe {
                     let these = sums.of_group::<S>(frame, planes, x, y, side);
-                    match of8 {
-                        None => these,
-                        Some(others) => M::select::<S>(same, these, others),
-                    }
-                });
+                    of8 = if same == windows { these } else { M::select::<S>(same, these, of8) };
+                }
                 continue;
             }
             for lane in Bits(same) {
@@ -319,10 +319,7 @@ impl Tile<'_> {
                 };
                 match one {
                     // SAFETY: as the caller's.
-                    Some(one) => unsafe {
-                        let all = of8.get_or_insert_with(|| M::none::<S>());
-                        M::put::<S>(all, lane, one);
-                    },
+                    Some(one) => unsafe { M::put::<S>(&mut of8, lane, one) },
                     None => plain |= 1 << lane,
                 }
             }
