@@ -61,6 +61,14 @@ impl Grid {
         y * self.row_stride + x * self.point_stride
     }
 
+    /// A number of bytes that every two pixels' fields are a multiple of apart.
+    fn step(&self) -> usize {
+        match self.height {
+            1 => self.point_stride,
+            _ => greatest_common_divisor(self.point_stride, self.row_stride),
+        }
+    }
+
     /// Whether a field of this grid at address `a` shares a byte with a field of `other` at address `b`.
     fn collides(&self, a: usize, other: &Grid, b: usize) -> bool {
         if a + self.extent() <= b || b + other.extent() <= a {
@@ -69,7 +77,9 @@ impl Grid {
         let same_lattice =
             self.point_stride == other.point_stride && self.row_stride == other.row_stride;
         if !same_lattice {
-            return true;
+            // Fields at different places of points of one size never meet, however the points are arranged.
+            let step = greatest_common_divisor(self.step(), other.step());
+            return a.abs_diff(b).is_multiple_of(step);
         }
         // Addresses are multiples of 4, so fields share a byte only where they are equal:
         // b - a = i * point_stride + j * row_stride.
@@ -82,6 +92,10 @@ impl Grid {
             rest % ps == 0 && (rest / ps).abs() < columns
         })
     }
+}
+
+fn greatest_common_divisor(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
 /// One field's base address, checked for NULL and alignment.

@@ -4,7 +4,7 @@ use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::depth_change::depth_change_map;
 use crate::distance::distance_map;
-use crate::methods::{Estimate, estimate};
+use crate::methods::{Estimate, estimate, estimate_window};
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
 use crate::smoothing_area::window_side;
@@ -91,6 +91,37 @@ impl Estimator {
             // SAFETY: `normals` has an element for every index, and no other thread is at work.
             unsafe { normals.write(k, 0, normal, curvature) };
         }
+        Ok(())
+    }
+
+    /// Computes the normal of pixel `(x, y)` from the window of `width` x `height` pixels around it, whatever the
+    /// depth changes, the smoothing size and the ignored border say; writes it to `normal`, which must be 1 x 1.
+    ///
+    /// The window starts at `(x - width / 2, y - height / 2)`; what lies outside the image is clipped, or folded
+    /// back with [`BorderPolicy::Mirror`](crate::BorderPolicy::Mirror). NaN if it gives no normal.
+    /// Errors: as [`Estimator::compute`], and [`Error::Index`] if the pixel is outside the cloud.
+    pub fn compute_window(
+        &mut self,
+        points: &Points,
+        (x, y): (usize, usize),
+        (width, height): (u32, u32),
+        normal: &mut Normals,
+    ) -> Result<(), Error> {
+        self.options.check()?;
+        if (normal.width(), normal.height()) != (1, 1) {
+            return Err(Error::Size);
+        }
+        if x >= points.width() || y >= points.height() {
+            return Err(Error::Index);
+        }
+        normal.check_disjoint(points)?;
+        let border_policy = self.options.border_policy;
+        let image = Image { width: points.width(), height: points.height(), border_policy };
+        let size = (width as usize, height as usize);
+        let found = estimate_window(self.options.method, points, &image, (x, y), size);
+        let towards = turn_to_viewpoint(found.normal, points.at(x, y), self.options.viewpoint);
+        // SAFETY: `normal` has this one element, and no other thread is at work.
+        unsafe { normal.write(0, 0, towards, found.curvature) };
         Ok(())
     }
 

@@ -300,6 +300,42 @@ pub unsafe extern "C" fn iine_estimator_compute_indices(
     })
 }
 
+/// Computes the normal of pixel (`x`, `y`) from the window of `rect_width` x `rect_height` pixels around it,
+/// whatever the depth changes, the smoothing size and the ignored border say, into the first element of `normal`
+/// (as PCL's `computePointNormal` after `setRectSize`).
+///
+/// The window starts at (x - rect_width / 2, y - rect_height / 2). What lies outside the image is left out with
+/// IINE_BORDER_POLICY_IGNORE and folded back with IINE_BORDER_POLICY_MIRROR. Where the window gives no normal, and
+/// a size of 0 never does, NaN is written. Takes time proportional to the window's area.
+///
+/// Errors: as `iine_estimator_compute`, IINE_ERROR_INDEX if the pixel is outside the cloud, and
+/// IINE_ERROR_OPTION_VALUE if a size is negative. Nothing is written then.
+///
+/// # Safety
+/// As `iine_estimator_compute`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_compute_window(
+    estimator: *mut iine_estimator,
+    points: *const iine_points,
+    x: u32,
+    y: u32,
+    rect_width: i32,
+    rect_height: i32,
+    normal: *const iine_normals,
+) -> i32 {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let estimator = &mut unsafe { reference_mut(estimator) }?.estimator;
+        // SAFETY: promised by the caller.
+        let points = unsafe { read_points(points) }?;
+        // SAFETY: promised by the caller.
+        let mut normal = unsafe { read_normals(normal, 1, 1, true) }?;
+        let size = |size| u32::try_from(size).map_err(|_| Error::OptionValue);
+        let size = (size(rect_width)?, size(rect_height)?);
+        estimator.compute_window(&points, (x as usize, y as usize), size, &mut normal)
+    })
+}
+
 /// Computes the maps behind the normals: those whose pointers in `maps` are not NULL.
 ///
 /// A map must overlap neither another map nor the range of bytes from a coordinate's first pixel to its last.

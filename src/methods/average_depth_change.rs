@@ -8,19 +8,20 @@ use crate::window::Image;
 /// The plain form.
 ///
 /// As PCL, the upper point is read one column to the left and the lower one one column to the right of the
-/// pixel, `side / 4` rows away, where one row further was meant. No normal if a half window has no finite z.
+/// pixel, a quarter of the window's height away, where one row further was meant. No normal if a half window has no finite z.
 pub(crate) fn estimate(
     points: &Points,
     image: &Image,
     (x, y): (usize, usize),
-    side: usize,
+    (width, height): (usize, usize),
 ) -> Estimate {
-    let (half, quarter) = (side / 2, (side / 4) as isize);
-    let (left, top) = (start(x, side), start(y, side));
+    let half = (width / 2, height / 2);
+    let (quarter_x, quarter_y) = ((width / 4) as isize, (height / 4) as isize);
+    let (left, top) = (start(x, width), start(y, height));
     let (x, y) = (x as isize, y as isize);
     let mean_z = |start| {
         let (mut sum, mut count) = (0.0, 0);
-        for rect in image.rects(start, (half, half)) {
+        for rect in image.rects(start, half) {
             for (x, y) in rect.pixels() {
                 let z = points.z(x, y);
                 if z.is_finite() {
@@ -32,10 +33,10 @@ pub(crate) fn estimate(
         (count > 0).then(|| sum / f64::from(count))
     };
     let means = [
-        mean_z((left, y - quarter)),
-        mean_z((x + 1, y - quarter)),
-        mean_z((x - quarter, top)),
-        mean_z((x - quarter, y + 1)),
+        mean_z((left, y - quarter_y)),
+        mean_z((x + 1, y - quarter_y)),
+        mean_z((x - quarter_x, top)),
+        mean_z((x - quarter_x, y + 1)),
     ];
     let [Some(left_z), Some(right_z), Some(up_z), Some(down_z)] = means else {
         return Estimate::NONE;
@@ -44,10 +45,10 @@ pub(crate) fn estimate(
         let (x, y) = image.pixel(x, y);
         points.at(x, y).map(f64::from)
     };
-    let left = single((x - quarter - 1, y));
-    let right = single((x + quarter + 1, y));
-    let up = single((x - 1, y - quarter));
-    let down = single((x + 1, y + quarter));
+    let left = single((x - quarter_x - 1, y));
+    let right = single((x + quarter_x + 1, y));
+    let up = single((x - 1, y - quarter_y));
+    let down = single((x + 1, y + quarter_y));
     let horizontal = [right[0] - left[0], right[1] - left[1], right_z - left_z];
     let vertical = [down[0] - up[0], down[1] - up[1], down_z - up_z];
     normal_of_tangents(vertical, horizontal)

@@ -13,12 +13,12 @@ pub(crate) fn estimate(
     points: &Points,
     image: &Image,
     (x, y): (usize, usize),
-    side: usize,
+    (width, height): (usize, usize),
 ) -> Estimate {
-    let window = (start(x, side), start(y, side));
+    let window = (start(x, width), start(y, height));
     let finite = || {
         image
-            .rects(window, (side, side))
+            .rects(window, (width, height))
             .flat_map(|rect| rect.pixels().map(|(x, y)| points.at(x, y)).collect::<Vec<_>>())
             .filter(|point| is_finite(*point))
             .map(|point| point.map(f64::from))

@@ -33,11 +33,22 @@ pub(crate) fn estimate(
     pixel: (usize, usize),
     side: usize,
 ) -> Estimate {
+    estimate_window(method, points, image, pixel, (side, side))
+}
+
+/// The estimate of pixel `(x, y)` from a window of any `size` (width, height), by walking over the window.
+pub(crate) fn estimate_window(
+    method: Method,
+    points: &Points,
+    image: &Image,
+    pixel: (usize, usize),
+    size: (usize, usize),
+) -> Estimate {
     match method {
-        Method::CovarianceMatrix => covariance_matrix::estimate(points, image, pixel, side),
-        Method::Average3DGradient => average_3d_gradient::estimate(points, image, pixel, side),
-        Method::AverageDepthChange => average_depth_change::estimate(points, image, pixel, side),
-        Method::Simple3DGradient => simple_3d_gradient::estimate(points, image, pixel, side),
+        Method::CovarianceMatrix => covariance_matrix::estimate(points, image, pixel, size),
+        Method::Average3DGradient => average_3d_gradient::estimate(points, image, pixel, size),
+        Method::AverageDepthChange => average_depth_change::estimate(points, image, pixel, size),
+        Method::Simple3DGradient => simple_3d_gradient::estimate(points, image, pixel, size),
     }
 }
 
