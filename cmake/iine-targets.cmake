@@ -34,21 +34,27 @@ endif()
 add_library(iine::iine ALIAS iine::${iine_kind})
 unset(iine_kind)
 
-# PCL is looked up where the target is used, so it may be found before or after iine.
+# PCL is looked up where a target is used, so it may be found before or after iine; without it, CMake names the
+# missing target.
 set(iine_pcl_found $<TARGET_EXISTS:pcl_features>)
 add_library(iine::pcl INTERFACE IMPORTED ${iine_SCOPE})
 set_target_properties(iine::pcl PROPERTIES
   INTERFACE_COMPILE_FEATURES cxx_std_14
-  INTERFACE_LINK_LIBRARIES "iine::iine;$<${iine_pcl_found}:pcl_features>")
+  INTERFACE_LINK_LIBRARIES
+    "iine::iine;$<IF:${iine_pcl_found},pcl_features,iine::needs_find_package_PCL_COMPONENTS_features>")
 
 # Our <pcl/features/integral_image_normal.h> must be found before PCL's, also where a project names PCL's
 # directory itself by include_directories(), which CMake puts first. Compilers search every -I directory before
-# any -isystem one, and ignore the -I of a directory that is named by -isystem too. So ours is -I, and PCL's
-# are -isystem.
-add_library(iine::pcl_dropin INTERFACE IMPORTED ${iine_SCOPE})
+# any -isystem one, and ignore the -I of a directory that is named by -isystem too. So ours is -I, and PCL's own
+# (include/pcl-1.13) is -isystem.
 set(iine_pcl_dirs $<TARGET_PROPERTY:pcl_features,INTERFACE_INCLUDE_DIRECTORIES>)
+set(iine_pcl_dirs "$<FILTER:${iine_pcl_dirs},INCLUDE,/pcl-[0-9.]+/?$>")
+set(iine_pcl_flags "$<$<BOOL:${iine_pcl_dirs}>:SHELL:-isystem $<JOIN:${iine_pcl_dirs}, -isystem >>")
+add_library(iine::pcl_dropin INTERFACE IMPORTED ${iine_SCOPE})
 set_target_properties(iine::pcl_dropin PROPERTIES
   INTERFACE_LINK_LIBRARIES iine::pcl
-  INTERFACE_COMPILE_OPTIONS "$<$<COMPILE_LANGUAGE:CXX>:-I${iine_INCLUDE_DIR}/iine/pcl/dropin>;$<$<AND:$<COMPILE_LANGUAGE:CXX>,${iine_pcl_found}>:SHELL:-isystem $<JOIN:${iine_pcl_dirs}, -isystem >>")
+  INTERFACE_COMPILE_OPTIONS
+    "$<$<COMPILE_LANGUAGE:CXX>:-I${iine_INCLUDE_DIR}/iine/pcl/dropin>;$<${iine_pcl_found}:${iine_pcl_flags}>")
+unset(iine_pcl_flags)
 unset(iine_pcl_dirs)
 unset(iine_pcl_found)

@@ -526,6 +526,50 @@ static void test_indices(void) {
   iine_estimator_free(e);
 }
 
+static void test_window(void) {
+  enum { X = 12, Y = 12 };
+  float one[8], one_before[8];
+  iine_estimator *const e = new_estimator();
+  const iine_points points = cloud_points();
+  const iine_normals whole = packed_normals(normals_out);
+  iine_normals normal = packed_normals(one), bad;
+  int k;
+  STATUS(IINE_OK, iine_estimator_set_normal_smoothing_size(e, 6.0f));
+  STATUS(IINE_OK, iine_estimator_compute(e, &points, &whole));
+  memset(one, 0x5a, sizeof one);
+  memcpy(one_before, one, sizeof one);
+
+  STATUS(IINE_ERROR_NULL_POINTER, iine_estimator_compute_window(NULL, &points, X, Y, 6, 6, &normal));
+  STATUS(IINE_ERROR_NULL_POINTER, iine_estimator_compute_window(e, NULL, X, Y, 6, 6, &normal));
+  STATUS(IINE_ERROR_NULL_POINTER, iine_estimator_compute_window(e, &points, X, Y, 6, 6, NULL));
+  STATUS(IINE_ERROR_INDEX, iine_estimator_compute_window(e, &points, WIDTH, Y, 6, 6, &normal));
+  STATUS(IINE_ERROR_INDEX, iine_estimator_compute_window(e, &points, X, HEIGHT, 6, 6, &normal));
+  STATUS(IINE_ERROR_INDEX, iine_estimator_compute_window(e, &points, UINT32_MAX, UINT32_MAX, 6, 6, &normal));
+  STATUS(IINE_ERROR_OPTION_VALUE, iine_estimator_compute_window(e, &points, X, Y, -1, 6, &normal));
+  STATUS(IINE_ERROR_OPTION_VALUE, iine_estimator_compute_window(e, &points, X, Y, 6, INT32_MIN, &normal));
+  bad = normal;
+  bad.struct_size = 1;
+  STATUS(IINE_ERROR_STRUCT_SIZE, iine_estimator_compute_window(e, &points, X, Y, 6, 6, &bad));
+  bad = normal;
+  bad.nz = misaligned(one);
+  STATUS(IINE_ERROR_MISALIGNED, iine_estimator_compute_window(e, &points, X, Y, 6, 6, &bad));
+  bad = normal;
+  bad.ny = &cloud[5].y;
+  STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_window(e, &points, X, Y, 6, 6, &bad));
+  CHECK(memcmp(one, one_before, sizeof one) == 0);
+
+  STATUS(IINE_OK, iine_estimator_compute_window(e, &points, X, Y, 6, 6, &normal));
+  for (k = 0; k < 3; ++k) {
+    CHECK(fabsf(one[k] - normals_out[4 * (Y * WIDTH + X) + k]) < 1e-5f);
+  }
+  CHECK(memcmp(one + 4, one_before + 4, 4 * sizeof(float)) == 0);
+  STATUS(IINE_OK, iine_estimator_compute_window(e, &points, 0, 0, INT32_MAX, INT32_MAX, &normal));
+  STATUS(IINE_OK, iine_estimator_compute_window(e, &points, X, Y, 0, 0, &normal));
+  CHECK(isnan(one[0]) && isnan(one[3]));
+  CHECK(memcmp(one + 4, one_before + 4, 4 * sizeof(float)) == 0);
+  iine_estimator_free(e);
+}
+
 static void test_maps(void) {
   static uint8_t depth_changes[PIXELS + 4], untouched_changes[PIXELS + 4];
   static float distances[PIXELS + 1], areas[PIXELS + 1], untouched[PIXELS + 1];
@@ -660,7 +704,7 @@ int main(void) {
       test_version,  test_isa_name,   test_status_strings,
       test_new_and_free,    test_options, test_refused_options_change_nothing,
       test_compute,  test_layouts,    test_threads_do_not_change_the_result,
-      test_compute_refuses, test_indices, test_maps,
+      test_compute_refuses, test_indices, test_window, test_maps,
       test_scratch,  test_small_clouds};
   size_t i;
   for (i = 0; i < sizeof tests / sizeof *tests; ++i) {
