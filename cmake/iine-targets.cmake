@@ -48,13 +48,12 @@ set_target_properties(iine::pcl PROPERTIES
 # any -isystem one, and ignore the -I of a directory that is named by -isystem too. So ours is -I, and PCL's own
 # (include/pcl-1.13) is -isystem.
 set(iine_pcl_dirs $<TARGET_PROPERTY:pcl_features,INTERFACE_INCLUDE_DIRECTORIES>)
-set(iine_pcl_dirs "$<FILTER:${iine_pcl_dirs},INCLUDE,/pcl-[0-9.]+/?$>")
-set(iine_pcl_flags "$<$<BOOL:${iine_pcl_dirs}>:SHELL:-isystem $<JOIN:${iine_pcl_dirs}, -isystem >>")
+set(iine_pcl_dirs $<REMOVE_DUPLICATES:$<FILTER:${iine_pcl_dirs},INCLUDE,/pcl-[0-9.]+/?$>>)
+set(iine_pcl_dirs "-I${iine_INCLUDE_DIR}/iine/pcl/dropin;$<${iine_pcl_found}:${iine_pcl_dirs}>")
 add_library(iine::pcl_dropin INTERFACE IMPORTED ${iine_SCOPE})
 set_target_properties(iine::pcl_dropin PROPERTIES
   INTERFACE_LINK_LIBRARIES iine::pcl
   INTERFACE_COMPILE_OPTIONS
-    "$<$<COMPILE_LANGUAGE:CXX>:-I${iine_INCLUDE_DIR}/iine/pcl/dropin>;$<${iine_pcl_found}:${iine_pcl_flags}>")
-unset(iine_pcl_flags)
+    "$<$<COMPILE_LANGUAGE:CXX>:SHELL:\"$<JOIN:${iine_pcl_dirs},\" -isystem \">\">")
 unset(iine_pcl_dirs)
 unset(iine_pcl_found)
