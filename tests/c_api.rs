@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What a program that links `libiine.a` must link too; `cmake/iine-targets.cmake` has the same list.
-const STATIC_LIBRARIES: [&str; 7] = ["-lgcc_s", "-lutil", "-lrt", "-lpthread", "-lm", "-ldl", "-lc"];
+const STATIC_LIBRARIES: [&str; 7] =
+    ["-lgcc_s", "-lutil", "-lrt", "-lpthread", "-lm", "-ldl", "-lc"];
 
 /// The libraries that cargo built for this very test.
 fn library(name: &str) -> PathBuf {
@@ -33,7 +34,9 @@ fn check(command: &mut Command) {
     let output = command.output().expect("a command that starts");
     assert!(
         output.status.success(),
-        "{command:?}: {}\n{}{}",
+        "{:?} {:?}: {}\n{}{}",
+        command.get_program(),
+        command.get_args().collect::<Vec<_>>(),
         output.status,
         String::from_utf8_lossy(&output.stdout),
         String::from_utf8_lossy(&output.stderr)
