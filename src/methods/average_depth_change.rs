@@ -8,7 +8,8 @@ use crate::window::Image;
 /// The plain form.
 ///
 /// As PCL, the upper point is read one column to the left and the lower one one column to the right of the
-/// pixel, a quarter of the window's height away, where one row further was meant. No normal if a half window has no finite z.
+/// pixel, a quarter of the window's height away, where one row further was meant. No normal if a half window has
+/// no finite z.
 pub(crate) fn estimate(
     points: &Points,
     image: &Image,
@@ -20,17 +21,18 @@ pub(crate) fn estimate(
     let (left, top) = (start(x, width), start(y, height));
     let (x, y) = (x as isize, y as isize);
     let mean_z = |start| {
-        let (mut sum, mut count) = (0.0, 0);
+        let (mut sum, mut count) = (0.0, 0_i32);
         for rect in image.rects(start, half) {
             for (x, y) in rect.pixels() {
                 let z = points.z(x, y);
                 if z.is_finite() {
-                    sum += f64::from(z);
-                    count += 1;
+                    sum += f64::from(rect.sign) * f64::from(z);
+                    count += rect.sign;
                 }
             }
         }
-        (count > 0).then(|| sum / f64::from(count))
+        // Counts are unsigned in PCL: one below zero is a very large one.
+        (count != 0).then(|| sum / f64::from(count as u32))
     };
     let means = [
         mean_z((left, y - quarter_y)),
@@ -51,5 +53,7 @@ pub(crate) fn estimate(
     let down = single((x + 1, y + quarter_y));
     let horizontal = [right[0] - left[0], right[1] - left[1], right_z - left_z];
     let vertical = [down[0] - up[0], down[1] - up[1], down_z - up_z];
-    normal_of_tangents(vertical, horizontal)
+    // In PCL's order, which differs from the other methods': it decides the sign where the surface is seen
+    // exactly edge-on and the viewpoint does not.
+    normal_of_tangents(horizontal, vertical)
 }

@@ -70,8 +70,8 @@ pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 
 /// The unit vector along the cross product of two tangents; none if they are parallel.
 #[inline(always)]
-pub(crate) fn normal_of_tangents(vertical: [f64; 3], horizontal: [f64; 3]) -> Estimate {
-    let n = cross(vertical, horizontal);
+pub(crate) fn normal_of_tangents(first: [f64; 3], second: [f64; 3]) -> Estimate {
+    let n = cross(first, second);
     let squared_length = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
     if squared_length == 0.0 {
         return Estimate::NONE;
