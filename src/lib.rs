@@ -30,10 +30,12 @@ mod distance;
 mod eigen;
 mod error;
 mod estimator;
+mod fast;
 mod isa;
 mod methods;
 mod options;
 mod orientation;
+mod simd;
 mod smoothing_area;
 mod window;
 
