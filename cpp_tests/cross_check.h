@@ -117,6 +117,7 @@ namespace cross_check
     std::size_t undefined = 0;      ///< PCL would leave the image
     std::size_t off_by_one = 0;     ///< PCL's border test for indices
     std::size_t lines = 0;          ///< masks differ where the window spans no plane: PCL's is rounding
+    std::size_t below_f32 = 0;      ///< only ours has a normal, and PCL's matrix is f32 rounding
     std::size_t edge_on = 0;        ///< the side seen is below f32's rounding
     std::size_t judged = 0;         ///< differences above 0.01 deg, all judged by the reference
     std::size_t worse = 0;          ///< of these, with PCL nearer the reference
@@ -344,8 +345,11 @@ namespace cross_check
         row.curvature_nan += std::isnan (our.curvature) != std::isnan (pcl.curvature);
         if (isNormal (our) != isNormal (pcl))
         {
-          if (is_covariance && estimate ().is_line)
+          const reference::Result truth = is_covariance ? estimate () : reference::Result ();
+          if (truth.is_line)
             ++row.lines;
+          else if (truth.is_below_f32 && isNormal (our))
+            ++row.below_f32;
           else
           {
             ++row.mask_mismatches;
@@ -455,10 +459,10 @@ namespace cross_check
           return;
         std::fprintf (file_,
                       "# %s\n# angles in degrees; ref: COVARIANCE_MATRIX against the f64 reference at every %dth normal\n"
-                      "%-31s%-55s %8s %8s %5s %6s %6s %5s %7s %6s %5s | %9s %9s %9s %9s | %9s %9s | %9s %9s %9s %9s | "
+                      "%-31s%-55s %8s %8s %5s %6s %6s %5s %5s %7s %6s %5s | %9s %9s %9s %9s | %9s %9s | %9s %9s %9s %9s | "
                       "%9s %9s\n",
                       name.c_str (), REFERENCE_STEP, "cloud", "configuration", "compared", "normals", "mask",
-                      "undef", "off1", "line", "edge-on", "judged", "worse", "p50", "p99", "p99.9", "max",
+                      "undef", "off1", "line", "f32", "edge-on", "judged", "worse", "p50", "p99", "p99.9", "max",
                       "ours p99.9", "ours max", "PCL p50", "PCL p99", "PCL p99.9", "PCL max", "ours curv", "PCL curv");
       }
 
@@ -466,15 +470,15 @@ namespace cross_check
       {
         if (file_ != nullptr)
           std::fclose (file_);
-        std::printf ("%-30s %10s %10s %6s %8s %7s %7s %8s %8s | worst p99.9 and max of ours to PCL's (deg)\n",
-                     name_.c_str (), "compared", "normals", "mask", "undef", "line", "judged", "worse", "off1");
+        std::printf ("%-30s %10s %10s %6s %8s %7s %7s %7s %8s %8s | worst p99.9 and max of ours to PCL's (deg)\n",
+                     name_.c_str (), "compared", "normals", "mask", "undef", "line", "f32", "judged", "worse", "off1");
         static const char *const METHODS[] = {"COVARIANCE_MATRIX", "AVERAGE_3D_GRADIENT", "AVERAGE_DEPTH_CHANGE",
                                               "SIMPLE_3D_GRADIENT"};
         for (int method = 0; method < 4; ++method)
         {
           const Sum &s = sums_[method];
-          std::printf ("%-30s %10zu %10zu %6zu %8zu %7zu %7zu %8zu %8zu | %.6f %.6f", METHODS[method], s.compared,
-                       s.normals, s.mask, s.undefined, s.lines, s.judged, s.worse, s.off_by_one, s.p999, s.max);
+          std::printf ("%-30s %10zu %10zu %6zu %8zu %7zu %7zu %7zu %8zu %8zu | %.6f %.6f", METHODS[method], s.compared,
+                       s.normals, s.mask, s.undefined, s.lines, s.below_f32, s.judged, s.worse, s.off_by_one, s.p999, s.max);
           if (method == reference::COVARIANCE_MATRIX)
             std::printf (" | to f64: ours %.7f %.6f, PCL's %.4f %.3f, curvature ours %.1e, PCL's %.1e", s.ours_p999,
                          s.ours_max, s.pcls_p999, s.pcls_max, s.our_curvature, s.pcl_curvature);
@@ -495,6 +499,7 @@ namespace cross_check
         s.undefined += r.undefined;
         s.off_by_one += r.off_by_one;
         s.lines += r.lines;
+        s.below_f32 += r.below_f32;
         s.judged += r.judged;
         s.worse += r.worse;
         s.p999 = std::max (s.p999, r.angle.at (0.999));
@@ -507,10 +512,10 @@ namespace cross_check
         s.pcl_curvature = std::max (s.pcl_curvature, r.pcl_curvature.at (1.0));
         if (file_ != nullptr)
           std::fprintf (file_,
-                        "%-31s%-55s %8zu %8zu %5zu %6zu %6zu %5zu %7zu %6zu %5zu | %9.6f %9.6f %9.6f %9.5f | %9.7f "
+                        "%-31s%-55s %8zu %8zu %5zu %6zu %6zu %5zu %5zu %7zu %6zu %5zu | %9.6f %9.6f %9.6f %9.5f | %9.7f "
                         "%9.7f | %9.5f %9.5f %9.4f %9.4f | %9.1e %9.1e\n",
                         cloud.c_str (), config.name ().c_str (), r.compared, r.normals, r.mask_mismatches, r.undefined,
-                        r.off_by_one, r.lines, r.edge_on, r.judged, r.worse, r.angle.at (0.5), r.angle.at (0.99),
+                        r.off_by_one, r.lines, r.below_f32, r.edge_on, r.judged, r.worse, r.angle.at (0.5), r.angle.at (0.99),
                         r.angle.at (0.999), r.angle.at (1.0), r.ours.at (0.999), r.ours.at (1.0), r.pcls.at (0.5),
                         r.pcls.at (0.99), r.pcls.at (0.999), r.pcls.at (1.0), r.our_curvature.at (1.0),
                         r.pcl_curvature.at (1.0));
@@ -519,7 +524,7 @@ namespace cross_check
     private:
       struct Sum
       {
-        std::size_t compared = 0, normals = 0, mask = 0, undefined = 0, off_by_one = 0, lines = 0, judged = 0,
+        std::size_t compared = 0, normals = 0, mask = 0, undefined = 0, off_by_one = 0, lines = 0, below_f32 = 0, judged = 0,
                     worse = 0;
         double p999 = 0, max = 0, ours_p999 = 0, ours_max = 0, pcls_p999 = 0, pcls_max = 0, our_curvature = 0,
                pcl_curvature = 0;

@@ -20,6 +20,9 @@ namespace reference
     double curvature = std::numeric_limits<double>::quiet_NaN ();
     /** \brief The window's points lie on a line or in one place, to f64's rounding: they span no plane. */
     bool is_line = false;
+    /** \brief The middle eigenvalue is below the rounding of the f32 sums of squares that PCL forms its matrix
+      * from (far from the origin): whether PCL's matrix spans a plane is chance. */
+    bool is_below_f32 = false;
     /** \brief The middle eigenvalue is at least 1.01 times the smallest. */
     bool is_plane_defined = false;
   };
@@ -127,7 +130,7 @@ namespace reference
       {
         Result result;
         Eigen::Vector3d mean = Eigen::Vector3d::Zero ();
-        double count = 0.0;
+        double count = 0.0, squares = 0.0;
         const int start_x = x_ - side_ / 2, start_y = y_ - side_ / 2;
         walk (start_x, start_y, side_, side_, [&] (int x, int y, int weight)
         {
@@ -135,6 +138,7 @@ namespace reference
           if (!point.allFinite ())
             return;
           mean += weight * point;
+          squares += weight * point.cwiseAbs2 ().maxCoeff ();
           count += weight;
         });
         if (count == 0.0)
@@ -159,6 +163,9 @@ namespace reference
         result.normal = solver.eigenvectors ().col (0);
         result.curvature = std::max (values[0], 0.0) / values.sum ();
         result.is_line = values[1] <= 1e-10 * values[2];
+        constexpr double F32_ROUNDING = 1.0 / (1 << 24);
+        result.is_below_f32 = values[1] * scale <= 4.0 * F32_ROUNDING * squares; // four roundings: two sums, their
+                                                                                 // product, the difference
         result.is_plane_defined = !result.is_line && values[1] >= 1.01 * values[0];
         return result;
       }

@@ -248,6 +248,12 @@ impl<'a> Points<'a> {
         self.at(x, y)[2]
     }
 
+    /// Whether the bytes `start..end` meet those from a coordinate's first pixel to its last.
+    pub(crate) fn reach_into(&self, start: usize, end: usize) -> bool {
+        let extent = self.grid.extent();
+        self.fields().into_iter().any(|field| start < field + extent && field < end)
+    }
+
     fn fields(&self) -> [usize; 3] {
         [self.x.addr(), self.y.addr(), self.z.addr()]
     }

@@ -407,12 +407,14 @@ int32_t iine_estimator_compute_window(struct iine_estimator *estimator,
 /**
  * Computes the maps behind the normals: those whose pointers in `maps` are not NULL.
  *
+ * A map must overlap neither another map nor the range of bytes from a coordinate's first pixel to its last.
+ *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_STRUCT_SIZE, IINE_ERROR_SIZE, IINE_ERROR_STRIDE,
- * IINE_ERROR_MISALIGNED, IINE_ERROR_OUT_OF_MEMORY. Nothing is written then.
+ * IINE_ERROR_MISALIGNED, IINE_ERROR_OVERLAP, IINE_ERROR_OUT_OF_MEMORY. Nothing is written then.
  *
  * # Safety
  * The pointers are NULL or valid as their structs say, for the whole call; each map is valid for width * height
- * writes and overlaps neither the points nor another map; no other thread uses `estimator` meanwhile.
+ * writes; no other thread uses `estimator` meanwhile.
  */
 int32_t iine_estimator_compute_maps(struct iine_estimator *estimator,
                                     const struct iine_points *points,

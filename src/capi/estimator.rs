@@ -338,12 +338,14 @@ pub unsafe extern "C" fn iine_estimator_compute_window(
 
 /// Computes the maps behind the normals: those whose pointers in `maps` are not NULL.
 ///
+/// A map must overlap neither another map nor the range of bytes from a coordinate's first pixel to its last.
+///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_STRUCT_SIZE, IINE_ERROR_SIZE, IINE_ERROR_STRIDE,
-/// IINE_ERROR_MISALIGNED, IINE_ERROR_OUT_OF_MEMORY. Nothing is written then.
+/// IINE_ERROR_MISALIGNED, IINE_ERROR_OVERLAP, IINE_ERROR_OUT_OF_MEMORY. Nothing is written then.
 ///
 /// # Safety
 /// The pointers are NULL or valid as their structs say, for the whole call; each map is valid for width * height
-/// writes and overlaps neither the points nor another map; no other thread uses `estimator` meanwhile.
+/// writes; no other thread uses `estimator` meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn iine_estimator_compute_maps(
     estimator: *mut iine_estimator,
@@ -358,7 +360,8 @@ pub unsafe extern "C" fn iine_estimator_compute_maps(
         // SAFETY: promised by the caller.
         let maps = unsafe { read_sized(maps, &[size_of::<iine_maps>()]) }?;
         let pixels = points.width() * points.height();
-        // SAFETY: promised by the caller.
+        check_maps_disjoint(&maps, pixels, &points)?;
+        // SAFETY: promised by the caller; they overlap nothing.
         let mut maps = unsafe {
             Maps {
                 depth_changes: optional_slice(maps.depth_changes, pixels)?,
@@ -368,6 +371,26 @@ pub unsafe extern "C" fn iine_estimator_compute_maps(
         };
         estimator.compute_maps(&points, &mut maps)
     })
+}
+
+/// Refuses maps of `pixels` elements that overlap each other or reach into the points' fields.
+fn check_maps_disjoint(maps: &iine_maps, pixels: usize, points: &Points) -> Result<(), Error> {
+    let float_bytes = pixels * size_of::<f32>();
+    let maps = [
+        (maps.depth_changes.addr(), pixels),
+        (maps.distances.addr(), float_bytes),
+        (maps.smoothing_areas.addr(), float_bytes),
+    ];
+    let mut seen: Vec<(usize, usize)> = Vec::new();
+    for (start, bytes) in maps.into_iter().filter(|(start, _)| *start != 0) {
+        let end = start.checked_add(bytes).ok_or(Error::Size)?;
+        let overlaps_map = seen.iter().any(|&(from, to)| start < to && from < end);
+        if overlaps_map || points.reach_into(start, end) {
+            return Err(Error::Overlap);
+        }
+        seen.push((start, end));
+    }
+    Ok(())
 }
 
 /// # Safety

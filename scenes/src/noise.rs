@@ -1,0 +1,115 @@
+//! What a Kinect makes of an exact cloud. A noisy depth keeps its pixel's ray, so x and y follow z.
+//!
+//! The truth of a noisy pixel is the surface that its depth was taken from: with lateral noise, the one its
+//! displaced ray hit.
+
+use crate::random::Random;
+use crate::render::{Frame, Sight};
+use crate::vector::dot;
+
+/// A sensor noise model.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Noise {
+    /// None.
+    None,
+    /// Axial and lateral noise after Nguyen, Izadi and Lovell, *Modeling Kinect Sensor Noise for Improved 3D
+    /// Reconstruction and Tracking*, 2012. Angles above 80 deg, where the model diverges, count as 80.
+    Nguyen,
+    /// Disparity noise of 0.5 px, rounded to whole device units, after Khoshelham and Elberink, *Accuracy and
+    /// Resolution of Kinect Depth Data for Indoor Mapping Applications*, 2012: 1/z = 3 - 2.85e-3 d.
+    Khoshelham,
+    /// Normally distributed in z with this standard deviation in metres (the paper's Fig. 8).
+    Gaussian(f64),
+}
+
+const STEEPEST: f64 = 80.0 / 180.0 * std::f64::consts::PI;
+
+impl Noise {
+    /// The model called `name`: none, nguyen, khoshelham, or gaussian-S with S in metres.
+    pub fn by_name(name: &str) -> Option<Noise> {
+        match name {
+            "none" => Some(Noise::None),
+            "nguyen" => Some(Noise::Nguyen),
+            "khoshelham" => Some(Noise::Khoshelham),
+            _ => name.strip_prefix("gaussian-")?.parse().ok().map(Noise::Gaussian),
+        }
+    }
+
+    /// The frame as the sensor sees it.
+    pub fn apply(self, exact: &Frame, random: &mut Random) -> Frame {
+        let Frame { scene, camera, .. } = exact;
+        let mut noisy = Frame {
+            scene: scene.clone(),
+            camera: camera.clone(),
+            points: Vec::with_capacity(exact.points.len()),
+            normals: Vec::with_capacity(exact.points.len()),
+            surfaces: Vec::with_capacity(exact.points.len()),
+        };
+        for y in 0..camera.height {
+            for x in 0..camera.width {
+                let (x, y) = (x as f64, y as f64);
+                let ray = camera.ray(x, y);
+                let sight = scene.look(ray).and_then(|sight| match self {
+                    Noise::None => Some(sight),
+                    Noise::Gaussian(sigma) => {
+                        Some(Sight { z: sight.z + sigma * random.normal(), ..sight })
+                    }
+                    Noise::Khoshelham => {
+                        Some(Sight { z: through_disparity(sight.z, random), ..sight })
+                    }
+                    Noise::Nguyen => {
+                        let theta = angle(&sight, ray);
+                        let sigma = lateral(theta);
+                        let aside =
+                            camera.ray(x + sigma * random.normal(), y + sigma * random.normal());
+                        let z_noise = random.normal();
+                        scene.look(aside).map(|seen| {
+                            let sigma = axial(angle(&seen, aside), seen.z);
+                            Sight { z: seen.z + sigma * z_noise, ..seen }
+                        })
+                    }
+                });
+                noisy.push(ray, sight.filter(|sight| sight.z > 0.0));
+            }
+        }
+        noisy
+    }
+}
+
+/// The angle between the surface's normal and the ray.
+fn angle(sight: &Sight, ray: [f64; 3]) -> f64 {
+    let cosine = -dot(sight.normal, ray) / dot(ray, ray).sqrt();
+    cosine.clamp(0.0, 1.0).acos().min(STEEPEST)
+}
+
+/// Nguyen's lateral standard deviation in pixels.
+fn lateral(theta: f64) -> f64 {
+    0.8 + 0.035 * theta / (std::f64::consts::FRAC_PI_2 - theta)
+}
+
+/// Nguyen's axial standard deviation in metres.
+fn axial(theta: f64, z: f64) -> f64 {
+    let frontal = 0.0012 + 0.0019 * (z - 0.4) * (z - 0.4);
+    if theta <= std::f64::consts::FRAC_PI_3 {
+        return frontal;
+    }
+    let left = std::f64::consts::FRAC_PI_2 - theta;
+    frontal + 0.0001 * theta * theta / (z.sqrt() * left * left)
+}
+
+/// A depth as it comes back from a noisy disparity in whole device units.
+fn through_disparity(z: f64, random: &mut Random) -> f64 {
+    const UNIT: f64 = 2.85e-3;
+    const SIGMA: f64 = 0.5;
+    let disparity = (3.0 - 1.0 / z) / UNIT + SIGMA * random.normal();
+    1.0 / (3.0 - UNIT * disparity.round())
+}
+
+/// Removes every point with this probability.
+pub fn drop_out(frame: &mut Frame, probability: f64, random: &mut Random) {
+    for point in &mut frame.points {
+        if random.uniform() < probability {
+            *point = [f32::NAN; 3];
+        }
+    }
+}

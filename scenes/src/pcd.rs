@@ -1,0 +1,213 @@
+//! PCD files: points (or normals) of organized clouds.
+
+use std::fmt;
+use std::path::Path;
+
+use crate::lzf;
+
+/// An organized cloud as a PCD file holds it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pcd {
+    /// Pixels in a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Translation x, y, z and rotation w, x, y, z of the sensor.
+    pub viewpoint: [f64; 7],
+    /// The points, row by row.
+    pub points: Vec<[f32; 3]>,
+}
+
+/// Why a file could not be read.
+#[derive(Debug)]
+pub enum PcdError {
+    /// The file system said so.
+    Io(std::io::Error),
+    /// Not a PCD file that this reader understands; the text says what is wrong.
+    Format(&'static str),
+}
+
+impl fmt::Display for PcdError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            PcdError::Io(error) => error.fmt(f),
+            PcdError::Format(text) => f.write_str(text),
+        }
+    }
+}
+
+impl std::error::Error for PcdError {}
+
+impl From<std::io::Error> for PcdError {
+    fn from(error: std::io::Error) -> Self {
+        PcdError::Io(error)
+    }
+}
+
+const IDENTITY: [f64; 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+
+struct Header<'a> {
+    fields: Vec<&'a str>,
+    sizes: Vec<usize>,
+    types: Vec<&'a str>,
+    counts: Vec<usize>,
+    width: usize,
+    height: usize,
+    viewpoint: [f64; 7],
+    data: &'a str,
+}
+
+fn parse_header(text: &str) -> Option<Header<'_>> {
+    let line = |key: &str| {
+        text.lines().find_map(|line| {
+            let mut words = line.split_whitespace();
+            (words.next()? == key).then(|| words.collect::<Vec<_>>())
+        })
+    };
+    let numbers = |key: &str| -> Option<Vec<usize>> {
+        line(key)?.into_iter().map(|word| word.parse().ok()).collect()
+    };
+    let fields = line("FIELDS")?;
+    let viewpoint = line("VIEWPOINT").map_or(Some(IDENTITY), |words| {
+        let numbers: Option<Vec<f64>> = words.into_iter().map(|word| word.parse().ok()).collect();
+        numbers?.try_into().ok()
+    })?;
+    Some(Header {
+        sizes: numbers("SIZE")?,
+        types: line("TYPE")?,
+        counts: numbers("COUNT").unwrap_or_else(|| vec![1; fields.len()]),
+        fields,
+        width: *numbers("WIDTH")?.first()?,
+        height: *numbers("HEIGHT")?.first()?,
+        viewpoint,
+        data: line("DATA")?.first()?,
+    })
+}
+
+impl Pcd {
+    /// Reads the points (fields x, y, z of type float) of an ascii, binary or binary_compressed file.
+    ///
+    /// Errors: [`PcdError`] if the file cannot be read or is not such a file.
+    pub fn read(path: impl AsRef<Path>) -> Result<Pcd, PcdError> {
+        Self::parse(&std::fs::read(path)?, ["x", "y", "z"])
+    }
+
+    /// Reads three fields of type float by their names out of a file's bytes.
+    ///
+    /// Errors: as [`Pcd::read`].
+    pub fn parse(bytes: &[u8], names: [&str; 3]) -> Result<Pcd, PcdError> {
+        let broken = PcdError::Format;
+        let data_line =
+            bytes.windows(5).position(|window| window == b"DATA ").ok_or(broken("no DATA line"))?;
+        let line_end =
+            bytes[data_line..].iter().position(|byte| *byte == b'\n').ok_or(broken("no data"))?;
+        let (header, data) = bytes.split_at(data_line + line_end + 1);
+        let header = std::str::from_utf8(header).map_err(|_| broken("the header is not text"))?;
+        let header = parse_header(header).ok_or(broken("the header lacks a line"))?;
+        let pixels = header
+            .width
+            .checked_mul(header.height)
+            .filter(|pixels| *pixels <= 1 << 30)
+            .ok_or(broken("the size is too large"))?;
+        let count = header.fields.len();
+        if [header.sizes.len(), header.types.len(), header.counts.len()] != [count; 3] {
+            return Err(broken("the header's lists differ in length"));
+        }
+        let mut columns = [0; 3];
+        for (column, name) in columns.iter_mut().zip(names) {
+            *column = header
+                .fields
+                .iter()
+                .position(|field| *field == name)
+                .ok_or(broken("a field is missing"))?;
+            let kind = (header.types[*column], header.sizes[*column], header.counts[*column]);
+            if kind != ("F", 4, 1) {
+                return Err(broken("a field is not one float"));
+            }
+        }
+        let widths: Vec<usize> =
+            header.sizes.iter().zip(&header.counts).map(|(size, count)| size * count).collect();
+        let before = |column: usize| widths[..column].iter().sum::<usize>();
+        let stride = before(count);
+        let points = match header.data {
+            "ascii" => ascii(data, &header, columns, pixels),
+            "binary" => {
+                let offsets = columns.map(before);
+                floats(data, pixels, |pixel, i| pixel * stride + offsets[i])
+            }
+            "binary_compressed" => {
+                let unpacked = uncompressed(data, stride * pixels)
+                    .ok_or(broken("the compressed data is damaged"))?;
+                // Compressed files hold one field after the other.
+                let offsets = columns.map(|column| before(column) * pixels);
+                floats(&unpacked, pixels, |pixel, i| offsets[i] + pixel * 4)
+            }
+            _ => return Err(broken("unknown kind of data")),
+        };
+        let points = points.ok_or(broken("the data is too short"))?;
+        Ok(Pcd { width: header.width, height: header.height, viewpoint: header.viewpoint, points })
+    }
+
+    /// Writes a binary file whose three float fields have these names.
+    pub fn write(&self, path: impl AsRef<Path>, names: [&str; 3]) -> std::io::Result<()> {
+        let pixels = self.points.len();
+        let viewpoint = self.viewpoint.map(|number| number.to_string()).join(" ");
+        let header = format!(
+            "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS {}\nSIZE 4 4 4\nTYPE F F F\n\
+             COUNT 1 1 1\nWIDTH {}\nHEIGHT {}\nVIEWPOINT {viewpoint}\nPOINTS {pixels}\nDATA binary\n",
+            names.join(" "),
+            self.width,
+            self.height,
+        );
+        let mut bytes = header.into_bytes();
+        bytes.extend(self.points.iter().flatten().flat_map(|number| number.to_le_bytes()));
+        std::fs::write(path, bytes)
+    }
+
+    /// A cloud or its normals, seen from the origin.
+    pub fn new(width: usize, height: usize, points: Vec<[f32; 3]>) -> Self {
+        Pcd { width, height, viewpoint: IDENTITY, points }
+    }
+}
+
+fn ascii(
+    data: &[u8],
+    header: &Header,
+    columns: [usize; 3],
+    pixels: usize,
+) -> Option<Vec<[f32; 3]>> {
+    let before = |column: usize| header.counts[..column].iter().sum::<usize>();
+    let words = columns.map(before);
+    let lines = std::str::from_utf8(data).ok()?.lines().filter(|line| !line.trim().is_empty());
+    let points: Option<Vec<[f32; 3]>> = lines
+        .take(pixels)
+        .map(|line| {
+            let line: Vec<&str> = line.split_whitespace().collect();
+            let number = |i: usize| line.get(words[i])?.parse().ok();
+            Some([number(0)?, number(1)?, number(2)?])
+        })
+        .collect();
+    points.filter(|points| points.len() == pixels)
+}
+
+fn uncompressed(data: &[u8], length: usize) -> Option<Vec<u8>> {
+    let size =
+        |at: usize| Some(u32::from_le_bytes(data.get(at..at + 4)?.try_into().ok()?) as usize);
+    if size(4)? != length {
+        return None;
+    }
+    lzf::decompress(data.get(8..8 + size(0)?)?, length)
+}
+
+fn floats(
+    data: &[u8],
+    pixels: usize,
+    offset: impl Fn(usize, usize) -> usize,
+) -> Option<Vec<[f32; 3]>> {
+    let float = |at: usize| Some(f32::from_le_bytes(data.get(at..at + 4)?.try_into().ok()?));
+    (0..pixels)
+        .map(|pixel| {
+            Some([float(offset(pixel, 0))?, float(offset(pixel, 1))?, float(offset(pixel, 2))?])
+        })
+        .collect()
+}
