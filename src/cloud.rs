@@ -475,22 +475,20 @@ impl Normals<'_> {
         normal: &[[f32; 8]; 3],
         curvature: &[f32; 8],
     ) {
-        let first = self.grid.offset(x, y);
-        let [nx, ny, nz] = self.normal;
-        for lane in 0..8 {
-            let offset = first + lane * self.grid.point_stride;
-            // SAFETY: as the caller's.
-            unsafe {
-                nx.byte_add(offset).write(normal[0][lane]);
-                ny.byte_add(offset).write(normal[1][lane]);
-                nz.byte_add(offset).write(normal[2][lane]);
+        let (first, step) = (self.grid.offset(x, y), self.grid.point_stride);
+        let [nx, ny, nz] = self.normal.map(|field| field.wrapping_byte_add(first));
+        // SAFETY: as the caller's.
+        unsafe {
+            for lane in 0..8 {
+                nx.byte_add(lane * step).write(normal[0][lane]);
+                ny.byte_add(lane * step).write(normal[1][lane]);
+                nz.byte_add(lane * step).write(normal[2][lane]);
             }
-        }
-        if let Some((field, grid)) = self.curvature {
-            let first = grid.offset(x, y);
-            for (lane, value) in curvature.iter().enumerate() {
-                // SAFETY: as the caller's.
-                unsafe { field.byte_add(first + lane * grid.point_stride).write(*value) };
+            if let Some((field, grid)) = self.curvature {
+                let field = field.byte_add(grid.offset(x, y));
+                for (lane, value) in curvature.iter().enumerate() {
+                    field.byte_add(lane * grid.point_stride).write(*value);
+                }
             }
         }
     }

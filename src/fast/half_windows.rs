@@ -86,7 +86,8 @@ impl Sums for HalfWindows {
             let row = integrals.add(place * frame.stride);
             *row.add(MARGIN - 1) = 0.0;
             let mut carry = S::splat_d(0.0);
-            for at in (MARGIN..MARGIN + groups * GROUP).step_by(GROUP) {
+            for group in 0..groups {
+                let at = MARGIN + group * GROUP;
                 let along = S::add_d(S::prefix_sum_d(S::widen(S::load(z.add(at)))), carry);
                 carry = S::last_d(along);
                 let sum = match self.last {
@@ -124,24 +125,26 @@ impl Sums for HalfWindows {
 
             let (next, before) = (x + quarter + 1, x - quarter - 1);
             let (above, below) = (y - quarter, y + quarter);
-            let across_xy =
-                |c| point::<S>(frame, planes, c, y, next) - point(frame, planes, c, y, before);
-            let along_xy = |c| {
-                point::<S>(frame, planes, c, below, x + 1) - point(frame, planes, c, above, x - 1)
-            };
-            [
-                [across_xy(0), across_xy(1), across.narrow()],
-                [along_xy(0), along_xy(1), along.narrow()],
-            ]
+            let mut tangents = [[across.narrow(); 3], [along.narrow(); 3]];
+            for c in 0..2 {
+                tangents[0][c] =
+                    point::<S>(frame, planes, c, y, next) - point(frame, planes, c, y, before);
+                tangents[1][c] = point::<S>(frame, planes, c, below, x + 1)
+                    - point(frame, planes, c, above, x - 1);
+            }
+            tangents
         }
     }
 
     #[inline(always)]
     unsafe fn select<S: Simd>(lanes: u32, yes: Self::Of8<S>, no: Self::Of8<S>) -> Self::Of8<S> {
         let mut tangents = no;
-        for (to, yes) in tangents.iter_mut().flatten().zip(yes.iter().flatten()) {
-            // SAFETY: as the caller's.
-            *to = Floats(unsafe { S::select(S::mask(lanes), yes.0, to.0) });
+        for g in 0..2 {
+            for c in 0..3 {
+                // SAFETY: as the caller's.
+                let lane = unsafe { S::select(S::mask(lanes), yes[g][c].0, no[g][c].0) };
+                tangents[g][c] = Floats(lane);
+            }
         }
         tangents
     }
@@ -200,9 +203,13 @@ impl Sums for HalfWindows {
 
     #[inline(always)]
     unsafe fn put<S: Simd>(tangents: &mut Self::Of8<S>, lane: usize, one: Self::Of1) {
-        for (to, one) in tangents.iter_mut().flatten().zip(one.iter().flatten()) {
-            // SAFETY: as the caller's.
-            *to = Floats(unsafe { S::select(S::mask(1 << lane), S::splat(*one), to.0) });
+        for g in 0..2 {
+            for c in 0..3 {
+                // SAFETY: as the caller's.
+                let with =
+                    unsafe { S::select(S::mask(1 << lane), S::splat(one[g][c]), tangents[g][c].0) };
+                tangents[g][c] = Floats(with);
+            }
         }
     }
 
@@ -211,7 +218,7 @@ impl Sums for HalfWindows {
         &self,
         _frame: &Frame,
         tangents: &Self::Of8<S>,
-        _sides: S::F,
+        sides: S::F,
     ) -> Found<S> {
         let [h, v] = *tangents;
         // SAFETY: as the caller's.
@@ -221,11 +228,13 @@ impl Sums for HalfWindows {
             let sine = dot(h, h) * dot(v, v) * Floats::splat(DOUBT_SINE);
             // Below this, squares of floats lose digits.
             let least = Floats::splat(f32::MIN_POSITIVE / f32::EPSILON);
+            // In windows of 3 both tangents join the same two points: floats decide the direction, as in PCL.
+            let smallest = Floats::<S>(sides).lt(Floats::splat(4.0));
             let scale = Floats::splat(1.0) / n2.sqrt();
             Found {
                 normal: [n[0] * scale, n[1] * scale, n[2] * scale],
                 curvature: Floats::splat(f32::NAN),
-                doubtful: !sine.max(least).lt(n2),
+                doubtful: !(sine.max(least).lt(n2) | smallest),
             }
         }
     }

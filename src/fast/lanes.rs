@@ -82,11 +82,24 @@ impl LaneOrder {
             let end = (first + BLOCK).min(self.segment);
             for lane in 0..LANES {
                 let start = lane * self.segment;
-                for element in first..end.min(self.width.saturating_sub(start)) {
-                    // SAFETY: start + element < width, and element < segment = length of `to`.
-                    unsafe {
-                        let from = row.byte_add((start + element) * stride);
+                let end = end.min(self.width.saturating_sub(start));
+                let mut element = first;
+                let mut from = row.wrapping_byte_add((start + element) * stride);
+                // SAFETY: start + element < width, and element < segment = length of `to`.
+                unsafe {
+                    while element + 4 <= end {
+                        let to = to.add(element * LANES + lane);
+                        to.write(from.read());
+                        to.add(LANES).write(from.byte_add(stride).read());
+                        to.add(2 * LANES).write(from.byte_add(2 * stride).read());
+                        to.add(3 * LANES).write(from.byte_add(3 * stride).read());
+                        from = from.wrapping_byte_add(4 * stride);
+                        element += 4;
+                    }
+                    while element < end {
                         to.add(element * LANES + lane).write(from.read());
+                        from = from.wrapping_byte_add(stride);
+                        element += 1;
                     }
                 }
             }

@@ -32,6 +32,7 @@ use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::options::{Method, Options};
 use crate::simd::{GROUP, Simd};
+use crate::smoothing_area::depth_smoothing;
 use crate::threads::Workers;
 use crate::window::Image;
 
@@ -128,13 +129,15 @@ pub(crate) fn compute(
     let whole_points = points.has_whole_points(normals);
     let job = Job { isa, points, options, image, whole_points };
 
-    let reach = job.reach();
+    // One sweep over all rows needs no bound on its reach.
+    let reach = if count > 1 { job.reach(job.deepest(workers)) } else { height };
     let chunks = chunks(height, count, reach);
     let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
     let length = row_length(width);
     reserve(rows, swept * length)?;
     let limit = job.sweep(workers, each, &chunks, &mut rows[..swept * length]);
 
+    let reach = job.reach(limit);
     let rows = &rows[..swept * length];
     let per_chunk = chunks[0].own.len();
     let sides = |y: usize| {
@@ -202,25 +205,22 @@ impl<T> Parts<T> {
 }
 
 impl Job<'_> {
-    /// How far a window or a depth change that decides one can be from its pixel, in pixels.
-    fn reach(&self) -> usize {
-        let largest = self.image.width + self.image.height;
-        let mut smoothing = self.options.normal_smoothing_size;
-        if self.options.depth_dependent_smoothing {
-            let mut deepest = 0.0_f32;
-            for y in 0..self.image.height {
-                let (row, stride) = self.points.z_row(y);
-                for x in 0..self.image.width {
-                    // SAFETY: the pixel is inside the cloud.
-                    let z = unsafe { row.byte_add(x * stride).read() };
-                    if z > deepest && z.is_finite() {
-                        deepest = z;
-                    }
-                }
-            }
-            smoothing += deepest / 10.0;
-        }
-        (smoothing as usize + 2).min(largest)
+    /// How far a window, or a depth change that decides one, can be from its pixel, where no depth is above `deepest`.
+    fn reach(&self, deepest: f32) -> usize {
+        let smoothing = depth_smoothing(deepest, self.options);
+        (smoothing as usize + 2).min(self.image.width + self.image.height)
+    }
+
+    /// The largest finite magnitude of the depths.
+    fn deepest(&self, workers: &Workers) -> f32 {
+        let deepest = AtomicU32::new(0);
+        workers.for_each(self.image.height, |_, y| {
+            let depths = (0..self.image.width).map(|x| self.points.z(x, y).abs());
+            let largest = depths.filter(|z| z.is_finite()).fold(0.0, f32::max);
+            // Positive floats are in the order of their bits.
+            deepest.fetch_max(largest.to_bits(), Ordering::Relaxed);
+        });
+        f32::from_bits(deepest.into_inner())
     }
 
     /// Steps 1 to 3: fills the rows with sides of windows. Returns the largest magnitude of a finite depth.

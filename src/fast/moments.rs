@@ -35,7 +35,7 @@ impl<T: Copy> Clone for WindowMoments<T> {
 impl<T: Copy> Copy for WindowMoments<T> {}
 
 /// One unit in the last place of a double, and how many of it the path to a sum may gather.
-const ROUNDING: f64 = 16.0 * f64::EPSILON;
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// Newton steps for the eigenvalue: one or two are usual, a few more where two eigenvalues are near.
 const STEPS: usize = 8;
@@ -92,7 +92,8 @@ impl Sums for Moments {
             for c in 0..CHANNELS {
                 *integrals.add(Self::plane(frame, c, place) + MARGIN - 1) = 0.0;
             }
-            for at in (MARGIN..MARGIN + groups * GROUP).step_by(GROUP) {
+            for group in 0..groups {
+                let at = MARGIN + group * GROUP;
                 let x = Floats(S::load(from[0].add(at))).widen() - origin[0];
                 let y = Floats(S::load(from[1].add(at))).widen() - origin[1];
                 let z = Floats(S::load(from[2].add(at))).widen() - origin[2];
@@ -134,13 +135,13 @@ impl Sums for Moments {
         // SAFETY: as the caller's: rows and columns are held, and so are the groups from these columns on.
         unsafe {
             let mut sums = [Doubles::splat(0.0); CHANNELS];
-            for (c, sum) in sums.iter_mut().enumerate() {
+            for c in 0..CHANNELS {
                 let top = integrals.add(Self::plane(frame, c, top));
                 let bottom = integrals.add(Self::plane(frame, c, bottom));
                 let lower =
                     Doubles(S::load_d(bottom.add(right))) - Doubles(S::load_d(bottom.add(left)));
                 let upper = Doubles(S::load_d(top.add(right))) - Doubles(S::load_d(top.add(left)));
-                *sum = lower - upper;
+                sums[c] = lower - upper;
             }
             WindowMoments { sums, count: Doubles::splat((side * side) as f64) }
         }
@@ -151,8 +152,9 @@ impl Sums for Moments {
         let mut moments = no;
         // SAFETY: as the caller's.
         unsafe {
-            for (to, yes) in moments.sums.iter_mut().zip(yes.sums) {
-                *to = Doubles(S::select_bits_d(lanes, yes.0, to.0));
+            for c in 0..CHANNELS {
+                let sum = S::select_bits_d(lanes, yes.sums[c].0, no.sums[c].0);
+                moments.sums[c] = Doubles(sum);
             }
             moments.count = Doubles(S::select_bits_d(lanes, yes.count.0, no.count.0));
         }
@@ -265,9 +267,9 @@ impl Sums for Moments {
             let scale = one / best_xy.max(a_zz);
             let columns = [[a_xx, a_xy, a_xz], [a_xy, a_yy, a_yz], [a_xz, a_yz, a_zz]];
             let mut n = [Floats::splat(0.0); 3];
-            for (to, [of_x, of_y, of_z]) in n.iter_mut().zip(columns) {
-                let of_xy = a_xx.select_lt(a_yy, of_y, of_x);
-                *to = (best_xy.select_lt(a_zz, of_z, of_xy) * scale).narrow();
+            for c in 0..3 {
+                let of_xy = a_xx.select_lt(a_yy, columns[1][c], columns[0][c]);
+                n[c] = (best_xy.select_lt(a_zz, columns[2][c], of_xy) * scale).narrow();
             }
             let scale = Floats::splat(1.0) / dot(n, n).sqrt();
             let least = Doubles::splat(DOUBT_SUMS * self.error);

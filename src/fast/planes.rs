@@ -116,7 +116,8 @@ impl Planes {
             let (ys, zs) = (xs.add(frame.stride), xs.add(2 * frame.stride));
             let mut hidden = S::splat(0.0);
             let mut largest = S::splat(0.0);
-            for at in (0..frame.groups() * GROUP).step_by(GROUP) {
+            for group in 0..frame.groups() {
+                let at = group * GROUP;
                 let (x, y, z) = (S::load(xs.add(at)), S::load(ys.add(at)), S::load(zs.add(at)));
                 let finite_z = S::finite(z);
                 let finite = S::and(finite_z, S::and(S::finite(x), S::finite(y)));

@@ -32,11 +32,6 @@ impl Sink<'_> {
         }
     }
 
-    /// Whether nothing is wanted of a row of pixels.
-    pub fn skips(&self, x: usize, y: usize, count: usize) -> bool {
-        matches!(self, Sink::Listed { .. }) && self.listed(x, y, count).is_empty()
-    }
-
     /// Writes the first `count` of eight normals, for the pixels from `(x, y)` on.
     ///
     /// # Safety
@@ -75,12 +70,16 @@ impl Sink<'_> {
     pub unsafe fn write_none(&self, x: usize, y: usize, count: usize) {
         let none = [f32::NAN; 3];
         match self {
-            Sink::All(normals) => {
-                for lane in 0..count {
-                    // SAFETY: as the caller's.
-                    unsafe { normals.write(x + lane, y, none, f32::NAN) };
+            // SAFETY: as the caller's.
+            Sink::All(normals) => unsafe {
+                if count == GROUP {
+                    normals.write_group(x, y, &[[f32::NAN; GROUP]; 3], &[f32::NAN; GROUP]);
+                } else {
+                    for lane in 0..count {
+                        normals.write(x + lane, y, none, f32::NAN);
+                    }
                 }
-            }
+            },
             Sink::Listed { normals, .. } => {
                 for (_, element) in self.listed(x, y, count) {
                     // SAFETY: as the caller's; every listed element is one of the normals.

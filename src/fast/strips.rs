@@ -96,7 +96,8 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
             unsafe {
                 let scale = S::splat(self.scale);
                 let mut carry = S::splat_i(0);
-                for at in (MARGIN..MARGIN + groups * GROUP).step_by(GROUP) {
+                for group in 0..groups {
+                    let at = MARGIN + group * GROUP;
                     let point = S::round_i(S::mul(S::load(from.add(at)), scale));
                     S::store_i(last.as_mut_ptr().add(at), point);
                     let strip = if SIMPLE || !self.started {
@@ -109,7 +110,8 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
                     carry = S::last_i(sum);
                 }
                 let columns = self.columns.as_mut_ptr();
-                for at in (MARGIN..MARGIN + groups * GROUP).step_by(GROUP) {
+                for group in 0..groups {
+                    let at = MARGIN + group * GROUP;
                     let mut strip = S::load_i(last.as_ptr().add(at));
                     if !SIMPLE {
                         strip = S::add_i(strip, S::load_i(last.as_ptr().add(at - 1)));
@@ -152,9 +154,11 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     #[inline(always)]
     unsafe fn select<S: Simd>(lanes: u32, yes: Self::Of8<S>, no: Self::Of8<S>) -> Self::Of8<S> {
         let mut sums = no;
-        for (to, yes) in sums.iter_mut().flatten().zip(yes.iter().flatten()) {
-            // SAFETY: as the caller's.
-            *to = unsafe { S::select_i(lanes, *yes, *to) };
+        for g in 0..2 {
+            for c in 0..3 {
+                // SAFETY: as the caller's.
+                sums[g][c] = unsafe { S::select_i(lanes, yes[g][c], no[g][c]) };
+            }
         }
         sums
     }
@@ -199,9 +203,11 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
 
     #[inline(always)]
     unsafe fn put<S: Simd>(sums: &mut Self::Of8<S>, lane: usize, one: Self::Of1) {
-        for (to, one) in sums.iter_mut().flatten().zip(one.iter().flatten()) {
-            // SAFETY: as the caller's.
-            *to = unsafe { S::select_i(1 << lane, S::splat_i(*one), *to) };
+        for g in 0..2 {
+            for c in 0..3 {
+                // SAFETY: as the caller's.
+                sums[g][c] = unsafe { S::select_i(1 << lane, S::splat_i(one[g][c]), sums[g][c]) };
+            }
         }
     }
 

@@ -220,13 +220,14 @@ impl Tile<'_> {
         hidden: bool,
     ) {
         let row = sides(y);
-        for x in self.columns.clone().step_by(GROUP) {
+        for group in 0..self.columns.len().div_ceil(GROUP) {
+            let x = self.columns.start + group * GROUP;
             let lanes = (self.columns.end - x).min(GROUP);
             let all = u32::MAX >> (u32::BITS as usize - lanes);
             // SAFETY: as the caller's; a row of sides is readable up to a whole group.
             unsafe {
-                let group = S::load(row.as_ptr().add(x));
-                let windows = S::bits(S::lt(S::splat(0.0), group)) & all;
+                let group_sides = S::load(row.as_ptr().add(x));
+                let windows = S::bits(S::lt(S::splat(0.0), group_sides)) & all;
                 if windows == 0 {
                     sink.write_none(x, y, lanes);
                     continue;
@@ -235,9 +236,16 @@ impl Tile<'_> {
                 let plain = if hidden {
                     windows
                 } else {
-                    let (of8, plain) =
-                        self.group::<S, M>(frame, planes, sums, sides, (x, y), group, windows);
-                    let found = sums.estimate::<S>(frame, &of8, group);
+                    let (of8, plain) = self.group::<S, M>(
+                        frame,
+                        planes,
+                        sums,
+                        sides,
+                        (x, y),
+                        group_sides,
+                        windows,
+                    );
+                    let found = sums.estimate::<S>(frame, &of8, group_sides);
                     let plain = plain | found.doubtful & windows;
                     let column = frame.column(x);
                     let point = [
