@@ -5,6 +5,7 @@
 //! points and normals may be disjoint fields of one array.
 
 use std::marker::PhantomData;
+use std::ops::Range;
 
 use crate::Error;
 
@@ -251,15 +252,74 @@ impl<'a> Points<'a> {
         [self.x.addr(), self.y.addr(), self.z.addr()]
     }
 
-    /// The shared geometry, and the addresses of row `y`'s first x, y and z.
+    /// Row `y`'s depths: the address of the first, and the bytes from one to the next.
     #[inline(always)]
-    #[allow(dead_code)]
-    pub(crate) fn row(&self, y: usize) -> (Grid, [*const f32; 3]) {
+    pub(crate) fn z_row(&self, y: usize) -> (*const f32, usize) {
         assert!(y < self.grid.height);
-        let offset = y * self.grid.row_stride;
-        // Within the allocation, as y is inside the grid; the reader's loads state their own bounds.
-        let at = |field: *const f32| field.wrapping_byte_add(offset);
-        (self.grid, [at(self.x), at(self.y), at(self.z)])
+        // SAFETY: row y is inside the grid that the constructor vouched for.
+        (unsafe { self.z.byte_add(y * self.grid.row_stride) }, self.grid.point_stride)
+    }
+
+    /// Whether the 16 bytes from a point's x are part of the same cloud, and of nothing that `normals` writes, for
+    /// every point but the last: then points can be read whole.
+    pub(crate) fn has_whole_points(&self, normals: &Normals) -> bool {
+        let interleaved = self.y == self.x.wrapping_add(1) && self.z == self.x.wrapping_add(2);
+        let apart = |(field, grid): &(*const f32, Grid)| {
+            let (start, end) = (self.x.addr(), self.x.addr() + self.grid.extent() + 3 * FIELD);
+            end <= field.addr() || field.addr() + grid.extent() <= start
+        };
+        interleaved
+            && self.grid.point_stride >= 4 * FIELD
+            && normals.fields().iter().flatten().all(apart)
+    }
+
+    /// Copies the points of row `y` in `columns` to three planes, `stride` floats apart in `to`; and zeros after
+    /// them up to a multiple of 8 and 8 more. `whole_points` as [`Points::has_whole_points`] says.
+    #[inline(always)]
+    pub(crate) fn read_row(
+        &self,
+        y: usize,
+        columns: Range<usize>,
+        stride: usize,
+        to: &mut [f32],
+        whole_points: bool,
+    ) {
+        let count = columns.len();
+        assert!(y < self.grid.height && columns.end <= self.grid.width);
+        assert!(to.len() >= 2 * stride + count.next_multiple_of(8) + 8);
+        let first = self.grid.offset(columns.start, y);
+        let step = self.grid.point_stride;
+        let mut done = 0;
+        #[cfg(target_arch = "x86_64")]
+        if whole_points {
+            use std::arch::x86_64::*;
+            // The cloud's last point is not read whole.
+            while done + 4 < count {
+                // SAFETY: four points that are not the last one lie inside the row, and four floats of each plane
+                // inside `to`; SSE is part of every x86-64.
+                unsafe {
+                    let from = self.x.byte_add(first + done * step);
+                    let [a, b, c, d] = [0, 1, 2, 3].map(|i| _mm_loadu_ps(from.byte_add(i * step)));
+                    let (ab_xy, cd_xy) = (_mm_unpacklo_ps(a, b), _mm_unpacklo_ps(c, d));
+                    let (ab_zw, cd_zw) = (_mm_unpackhi_ps(a, b), _mm_unpackhi_ps(c, d));
+                    let to = to.as_mut_ptr().add(done);
+                    _mm_storeu_ps(to, _mm_movelh_ps(ab_xy, cd_xy));
+                    _mm_storeu_ps(to.add(stride), _mm_movehl_ps(cd_xy, ab_xy));
+                    _mm_storeu_ps(to.add(2 * stride), _mm_movelh_ps(ab_zw, cd_zw));
+                }
+                done += 4;
+            }
+        }
+        for at in done..count {
+            let offset = first + at * step;
+            for (c, field) in [self.x, self.y, self.z].into_iter().enumerate() {
+                // SAFETY: the point is inside the grid that the constructor vouched for.
+                to[c * stride + at] = unsafe { field.byte_add(offset).read() };
+            }
+        }
+        for plane in to.chunks_mut(stride).take(3) {
+            plane[count..count.next_multiple_of(8) + 8].fill(0.0);
+        }
     }
 }
 
@@ -391,6 +451,40 @@ impl<'a> Normals<'a> {
             self.normal[2].byte_add(offset).write(normal[2]);
             if let Some((field, grid)) = self.curvature {
                 field.byte_add(grid.offset(x, y)).write(curvature);
+            }
+        }
+    }
+}
+
+impl Normals<'_> {
+    /// Writes eight pixels of a row.
+    ///
+    /// # Safety
+    /// As [`Normals::write`], for the pixels `x` to `x + 7`.
+    #[inline(always)]
+    pub(crate) unsafe fn write_group(
+        &self,
+        x: usize,
+        y: usize,
+        normal: &[[f32; 8]; 3],
+        curvature: &[f32; 8],
+    ) {
+        let first = self.grid.offset(x, y);
+        let [nx, ny, nz] = self.normal;
+        for lane in 0..8 {
+            let offset = first + lane * self.grid.point_stride;
+            // SAFETY: as the caller's.
+            unsafe {
+                nx.byte_add(offset).write(normal[0][lane]);
+                ny.byte_add(offset).write(normal[1][lane]);
+                nz.byte_add(offset).write(normal[2][lane]);
+            }
+        }
+        if let Some((field, grid)) = self.curvature {
+            let first = grid.offset(x, y);
+            for (lane, value) in curvature.iter().enumerate() {
+                // SAFETY: as the caller's.
+                unsafe { field.byte_add(first + lane * grid.point_stride).write(*value) };
             }
         }
     }

@@ -4,6 +4,8 @@ use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::depth_change::depth_change_map;
 use crate::distance::distance_map;
+use crate::fast::{self, SMALLEST_IMAGE, Scratch};
+use crate::isa::Isa;
 use crate::methods::{Estimate, estimate, estimate_window};
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
@@ -25,12 +27,30 @@ pub struct Maps<'a> {
 #[derive(Debug)]
 pub struct Estimator {
     options: Options,
+    isa: Isa,
+    scratch: Scratch,
 }
 
 impl Estimator {
     /// An estimator with these options.
     pub fn new(options: Options) -> Self {
-        Estimator { options }
+        Self::with_isa(options, Isa::active())
+    }
+
+    /// An estimator that computes with this instruction set, or with the active one if the processor lacks it.
+    pub fn with_isa(options: Options, isa: Isa) -> Self {
+        let isa = if isa.is_available() { isa } else { Isa::active() };
+        Estimator { options, isa, scratch: Scratch::default() }
+    }
+
+    /// The instruction set that computes.
+    pub fn isa(&self) -> Isa {
+        self.isa
+    }
+
+    /// Whether the plain form computes: because it was asked for, or the image is tiny.
+    fn is_plain(&self, points: &Points) -> bool {
+        self.isa == Isa::Scalar || points.width().min(points.height()) < SMALLEST_IMAGE
     }
 
     /// The options.
@@ -53,6 +73,16 @@ impl Estimator {
             return Err(Error::Size);
         }
         normals.check_disjoint(points)?;
+        if !self.is_plain(points) {
+            return fast::compute(
+                self.isa,
+                points,
+                &self.options,
+                None,
+                normals,
+                &mut self.scratch,
+            );
+        }
         let plain = Plain::new(points, &self.options);
         for y in 0..points.height() {
             for x in 0..points.width() {
@@ -84,6 +114,10 @@ impl Estimator {
             return Err(Error::Index);
         }
         normals.check_disjoint(points)?;
+        if !self.is_plain(points) {
+            let (options, scratch) = (&self.options, &mut self.scratch);
+            return fast::compute(self.isa, points, options, Some(indices), normals, scratch);
+        }
         let plain = Plain::new(points, &self.options);
         for (k, &index) in indices.iter().enumerate() {
             let (x, y) = (index as usize % points.width(), index as usize / points.width());
@@ -158,11 +192,13 @@ impl Estimator {
 
     /// How much scratch memory is held, in bytes.
     pub fn scratch_size(&self) -> usize {
-        0
+        self.scratch.size()
     }
 
     /// Frees the scratch memory and the worker threads; the next computation makes them anew.
-    pub fn release_scratch(&mut self) {}
+    pub fn release_scratch(&mut self) {
+        self.scratch = Scratch::default();
+    }
 }
 
 /// The plain form of the whole method: the specification that every fast path is held to.

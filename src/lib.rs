@@ -30,11 +30,14 @@ mod distance;
 mod eigen;
 mod error;
 mod estimator;
+mod fast;
 mod isa;
 mod methods;
 mod options;
 mod orientation;
+mod simd;
 mod smoothing_area;
+mod threads;
 mod window;
 
 pub use cloud::{Normals, Points};
