@@ -47,7 +47,7 @@ fn the_window_that_compute_takes_gives_its_normal() -> Result<(), Error> {
                 let found = window(&mut estimator, &points, (x, y), (6, 6))?;
                 for (i, value) in found.iter().enumerate() {
                     let expected = all[4 * (y * WIDTH + x) + i];
-                    let close = (value - expected).abs() < 1e-5;
+                    let close = (value - expected).abs() < 1e-4; // `compute` may sum in another order
                     assert!(close || value.is_nan() && expected.is_nan(), "{method:?} {x} {y}");
                 }
             }

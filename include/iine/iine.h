@@ -250,6 +250,8 @@ typedef struct iine_maps {
 
 
 
+
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus

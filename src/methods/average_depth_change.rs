@@ -55,5 +55,24 @@ pub(crate) fn estimate(
     let vertical = [down[0] - up[0], down[1] - up[1], down_z - up_z];
     // In PCL's order, which differs from the other methods': it decides the sign where the surface is seen
     // exactly edge-on and the viewpoint does not.
-    normal_of_tangents(horizontal, vertical)
+    if half == (1, 1) {
+        single_precision_normal(horizontal.map(|c| c as f32), vertical.map(|c| c as f32))
+    } else {
+        normal_of_tangents(horizontal, vertical)
+    }
+}
+
+/// The normal of the smallest windows, rounded as PCL rounds it.
+///
+/// With half windows of one pixel both tangents have the same x and y, and all that is left of the cross product is
+/// the difference of two nearly equal products. Its direction is that of f32's rounding in up to one normal of a
+/// thousand, which is kept, as the half windows' depths are in f32 exactly what PCL has.
+fn single_precision_normal(a: [f32; 3], b: [f32; 3]) -> Estimate {
+    let n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let squared_length = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+    if squared_length == 0.0 {
+        return Estimate::NONE;
+    }
+    let scale = 1.0 / squared_length.sqrt();
+    Estimate { normal: n.map(|c| c * scale), curvature: f32::NAN }
 }
