@@ -462,6 +462,18 @@ impl<'a> Normals<'a> {
     }
 }
 
+/// Stores the first two floats.
+///
+/// # Safety
+/// `to` is valid for their write.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+unsafe fn store_two(to: *mut f32, floats: std::arch::x86_64::__m128) {
+    use std::arch::x86_64::*;
+    // SAFETY: as the caller's; this store needs no alignment.
+    unsafe { _mm_storel_epi64(to.cast(), _mm_castps_si128(floats)) };
+}
+
 impl Normals<'_> {
     /// Writes eight pixels of a row.
     ///
@@ -479,16 +491,44 @@ impl Normals<'_> {
         let [nx, ny, nz] = self.normal.map(|field| field.wrapping_byte_add(first));
         // SAFETY: as the caller's.
         unsafe {
+            #[cfg(target_arch = "x86_64")]
+            if ny == nx.wrapping_add(1) && nz == nx.wrapping_add(2) {
+                use std::arch::x86_64::*;
+                // SSE is part of every x86-64; eight pixels, three floats together each.
+                for half in [0, 4] {
+                    let [x, y] = [0, 1].map(|c| _mm_loadu_ps(normal[c].as_ptr().add(half)));
+                    let z = _mm_loadu_ps(normal[2].as_ptr().add(half));
+                    let (xy_low, xy_high) = (_mm_unpacklo_ps(x, y), _mm_unpackhi_ps(x, y));
+                    let to = |lane: usize| nx.byte_add((half + lane) * step);
+                    store_two(to(0), xy_low);
+                    store_two(to(1), _mm_movehl_ps(xy_low, xy_low));
+                    store_two(to(2), xy_high);
+                    store_two(to(3), _mm_movehl_ps(xy_high, xy_high));
+                    _mm_store_ss(to(0).add(2), z);
+                    _mm_store_ss(to(1).add(2), _mm_shuffle_ps::<0b01>(z, z));
+                    _mm_store_ss(to(2).add(2), _mm_shuffle_ps::<0b10>(z, z));
+                    _mm_store_ss(to(3).add(2), _mm_shuffle_ps::<0b11>(z, z));
+                }
+                return self.write_group_curvature(x, y, curvature);
+            }
             for lane in 0..8 {
                 nx.byte_add(lane * step).write(normal[0][lane]);
                 ny.byte_add(lane * step).write(normal[1][lane]);
                 nz.byte_add(lane * step).write(normal[2][lane]);
             }
-            if let Some((field, grid)) = self.curvature {
-                let field = field.byte_add(grid.offset(x, y));
-                for (lane, value) in curvature.iter().enumerate() {
-                    field.byte_add(lane * grid.point_stride).write(*value);
-                }
+            self.write_group_curvature(x, y, curvature);
+        }
+    }
+
+    /// # Safety
+    /// As [`Normals::write_group`].
+    #[inline(always)]
+    unsafe fn write_group_curvature(&self, x: usize, y: usize, curvature: &[f32; 8]) {
+        if let Some((field, grid)) = self.curvature {
+            let field = field.wrapping_byte_add(grid.offset(x, y));
+            for (lane, value) in curvature.iter().enumerate() {
+                // SAFETY: as the caller's.
+                unsafe { field.byte_add(lane * grid.point_stride).write(*value) };
             }
         }
     }

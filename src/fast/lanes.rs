@@ -39,13 +39,14 @@ impl Lanes {
         unsafe { [S::load(self.0.as_ptr()), S::load(self.0.as_ptr().add(GROUP))] }
     }
 
+    /// Replaces one of both groups.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`; `group` is 0 or 1.
     #[inline(always)]
-    pub unsafe fn store<S: Simd>(&mut self, groups: [S::F; 2]) {
+    pub unsafe fn store_group<S: Simd>(&mut self, group: usize, value: S::F) {
         // SAFETY: as the caller's; 16 floats are two groups.
-        unsafe {
-            S::store(self.0.as_mut_ptr(), groups[0]);
-            S::store(self.0.as_mut_ptr().add(GROUP), groups[1]);
-        }
+        unsafe { S::store(self.0.as_mut_ptr().add(group * GROUP), value) };
     }
 }
 
@@ -56,9 +57,6 @@ pub(crate) struct LaneOrder {
     /// Pixels in a segment, so elements in a row.
     pub segment: usize,
 }
-
-/// Elements and lanes are moved in blocks, so that neither side of a transposition leaves the first-level cache.
-const BLOCK: usize = 16;
 
 impl LaneOrder {
     pub fn new(width: usize) -> Self {
@@ -78,28 +76,31 @@ impl LaneOrder {
     #[inline(always)]
     pub unsafe fn read(&self, row: *const f32, stride: usize, to: &mut [Lanes]) {
         let to = to[..self.segment].as_mut_ptr().cast::<f32>();
-        for first in (0..self.segment).step_by(BLOCK) {
-            let end = (first + BLOCK).min(self.segment);
-            for lane in 0..LANES {
-                let start = lane * self.segment;
-                let end = end.min(self.width.saturating_sub(start));
-                let mut element = first;
-                let mut from = row.wrapping_byte_add((start + element) * stride);
-                // SAFETY: start + element < width, and element < segment = length of `to`.
+        let lane_stride = self.segment * stride;
+        for lane in (0..LANES).step_by(4) {
+            // Elements that all four lanes have.
+            let together = self.width.saturating_sub((lane + 3) * self.segment).min(self.segment);
+            let mut from = row.wrapping_byte_add(lane * lane_stride);
+            for element in 0..together {
+                // SAFETY: the pixels' columns are below the width; element < segment = length of `to`.
                 unsafe {
-                    while element + 4 <= end {
-                        let to = to.add(element * LANES + lane);
-                        to.write(from.read());
-                        to.add(LANES).write(from.byte_add(stride).read());
-                        to.add(2 * LANES).write(from.byte_add(2 * stride).read());
-                        to.add(3 * LANES).write(from.byte_add(3 * stride).read());
-                        from = from.wrapping_byte_add(4 * stride);
-                        element += 4;
-                    }
-                    while element < end {
+                    let to = to.add(element * LANES + lane).cast::<[f32; 4]>();
+                    to.write([
+                        from.read(),
+                        from.byte_add(lane_stride).read(),
+                        from.byte_add(2 * lane_stride).read(),
+                        from.byte_add(3 * lane_stride).read(),
+                    ]);
+                }
+                from = from.wrapping_byte_add(stride);
+            }
+            for lane in lane..lane + 4 {
+                let start = lane * self.segment;
+                for element in together..self.segment.min(self.width.saturating_sub(start)) {
+                    // SAFETY: start + element < width, and element < segment = length of `to`.
+                    unsafe {
+                        let from = row.byte_add((start + element) * stride);
                         to.add(element * LANES + lane).write(from.read());
-                        from = from.wrapping_byte_add(stride);
-                        element += 1;
                     }
                 }
             }

@@ -34,9 +34,10 @@ const DOUBT_ROUNDING: f32 = 4e8;
 const DOUBT_SINE: f32 = 1e-6;
 
 impl<const SIMPLE: bool> Strips<SIMPLE> {
+    /// Where row `y` starts in a ring; the planes of its coordinates are a stride apart.
     #[inline(always)]
-    fn plane(frame: &Frame, c: usize, y: usize) -> usize {
-        (frame.place(y) * 3 + c) * frame.stride
+    fn start_of(frame: &Frame, y: usize) -> usize {
+        frame.place(y) * 3 * frame.stride
     }
 
     /// The sum between two columns' strips and between two rows' strips: first and last row that the column strips
@@ -83,8 +84,8 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
         let groups = frame.groups() + 1; // the strips' groups may reach one further
         for c in 0..3 {
             let start = c * frame.stride;
-            let own = Self::plane(frame, c, y);
-            let above = if self.started { Self::plane(frame, c, y - 1) } else { own };
+            let own = Self::start_of(frame, y) + start;
+            let above = if self.started { Self::start_of(frame, y - 1) + start } else { own };
             let from = planes.row(frame, c, y).as_ptr();
             let last = &mut self.last[start..start + frame.stride];
             let pair = &self.above[start..start + frame.stride];
@@ -138,14 +139,19 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
         let [[top, bottom, left, right], [before, end, upper, lower]] = Self::places(x, y, side);
         // SAFETY: as the caller's: rows and columns are held, and so are the groups from these columns on.
         unsafe {
+            let columns = self.columns.as_ptr();
+            let (top, bottom) = (Self::start_of(frame, top), Self::start_of(frame, bottom));
+            let (top, bottom) = (columns.add(top), columns.add(bottom));
+            let (left, right) = (frame.column(left), frame.column(right));
+            let rows = self.rows.as_ptr();
+            let (upper, lower) = (Self::start_of(frame, upper), Self::start_of(frame, lower));
+            let (upper, lower) = (rows.add(upper), rows.add(lower));
+            let (before, end) = (frame.column(before), frame.column(end));
             let mut sums = Self::none::<S>();
             for c in 0..3 {
-                let (top, bottom) = (Self::plane(frame, c, top), Self::plane(frame, c, bottom));
-                let (left, right) = (frame.column(left), frame.column(right));
-                sums[0][c] = difference::<S>(self.columns.as_ptr(), [top, bottom], [left, right]);
-                let (upper, lower) = (Self::plane(frame, c, upper), Self::plane(frame, c, lower));
-                let (before, end) = (frame.column(before), frame.column(end));
-                sums[1][c] = difference::<S>(self.rows.as_ptr(), [upper, lower], [before, end]);
+                let plane = c * frame.stride;
+                sums[0][c] = difference::<S>([top, bottom], [plane + left, plane + right]);
+                sums[1][c] = difference::<S>([upper, lower], [plane + before, plane + end]);
             }
             sums
         }
@@ -190,8 +196,11 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
             let (x0, x1) = (inside.x.start, inside.x.end);
             let (y0, y1) = (inside.y.start, inside.y.end);
             for c in 0..3 {
-                let column = |y, x| self.columns[Self::plane(frame, c, y) + frame.column(x)];
-                let row = |y, x| self.rows[Self::plane(frame, c, y) + frame.column(x)];
+                let column = |y, x| {
+                    self.columns[Self::start_of(frame, y) + c * frame.stride + frame.column(x)]
+                };
+                let row =
+                    |y, x| self.rows[Self::start_of(frame, y) + c * frame.stride + frame.column(x)];
                 let strip = |x| column(y1 - 1, x).wrapping_sub(column(y0 - 1, x));
                 let segment = |y| row(y, x1 - 1).wrapping_sub(row(y, x0 - 1));
                 sums[0][c] = sums[0][c].wrapping_add(strip(x1).wrapping_sub(strip(x0)));
@@ -240,13 +249,12 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
 /// # Safety
 /// The processor has the instruction set of `S`, and the groups are inside the ring.
 #[inline(always)]
-unsafe fn difference<S: Simd>(ring: *const i32, rows: [usize; 2], columns: [usize; 2]) -> S::I {
+unsafe fn difference<S: Simd>(rows: [*const i32; 2], columns: [usize; 2]) -> S::I {
     // SAFETY: as the caller's.
     unsafe {
-        let at = ring.add(rows[1]);
-        let lower = S::sub_i(S::load_i(at.add(columns[1])), S::load_i(at.add(columns[0])));
-        let at = ring.add(rows[0]);
-        let upper = S::sub_i(S::load_i(at.add(columns[1])), S::load_i(at.add(columns[0])));
+        let at = |row: usize, column: usize| rows[row].add(columns[column]);
+        let lower = S::sub_i(S::load_i(at(1, 1)), S::load_i(at(1, 0)));
+        let upper = S::sub_i(S::load_i(at(0, 1)), S::load_i(at(0, 0)));
         S::sub_i(lower, upper)
     }
 }

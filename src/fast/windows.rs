@@ -1,6 +1,8 @@
 //! Steps 1 to 3, fast: depth changes and the forward chamfer pass in one sweep down the rows, the backward pass and
 //! the sides of the windows in one sweep up. The plain forms are in `depth_change`, `distance`, `smoothing_area`.
 
+use std::ops::Range;
+
 use super::lanes::{LANES, LaneOrder, Lanes};
 use crate::cloud::Points;
 use crate::distance::{DIAGONAL, STRAIGHT, far};
@@ -15,56 +17,70 @@ pub(crate) struct WindowRows<'a> {
     rows: &'a mut [Lanes],
 }
 
-/// What the sweeps need beside the map: a few rows.
+/// What the sweeps need beside the map.
 #[derive(Debug, Default)]
 pub(crate) struct Sweep {
+    /// Rows of depths in lane order, each with an element more for the following segments' first pixels: all that are
+    /// swept if the upward sweep needs them again, else a ring of two.
     z: Vec<Lanes>,
-    z_below: Vec<Lanes>,
-    /// Masks: where the pixel has a right neighbour, and where there is a depth change to the right neighbour, to
-    /// the one below, and from the one above.
+    /// Rows in `z`, and the image's row that is the first in it.
+    z_rows: usize,
+    z_first: usize,
+    /// Masks: where the pixel has a right neighbour, and where there is a depth change from the one above.
     tested: Vec<Lanes>,
-    right: Vec<Lanes>,
-    below: Vec<Lanes>,
     above: Vec<Lanes>,
     sides: Vec<Lanes>,
 }
 
 impl Sweep {
-    fn resize(&mut self, order: LaneOrder) {
-        let segment = order.segment;
-        let Sweep { z, z_below, tested, right, below, above, sides } = self;
-        for rows in [z, z_below, tested, right, below, above, sides] {
-            rows.clear();
-            rows.resize(segment + 1, Lanes::ZERO);
-        }
+    fn resize(&mut self, order: LaneOrder, z_rows: usize, z_first: usize) {
+        (self.z_rows, self.z_first) = (z_rows, z_first);
+        let length = order.segment + 1;
+        let grow = |rows: &mut Vec<Lanes>, count: usize| {
+            if rows.len() < count {
+                rows.resize(count, Lanes::ZERO);
+            }
+        };
+        grow(&mut self.z, z_rows * length);
+        grow(&mut self.above, length);
+        grow(&mut self.sides, length);
+        self.above.fill(Lanes::ZERO);
+        self.tested.clear();
+        self.tested.resize(length, Lanes::ZERO);
         for x in 0..order.width - 1 {
             let (k, l) = order.place(x);
             self.tested[k].0[l] = f32::from_bits(!0);
         }
     }
 
+    /// Where row `y` of the depths lies in `z`.
+    fn z_place(&self, order: LaneOrder, y: usize) -> Range<usize> {
+        let length = order.segment + 1;
+        let start = (y - self.z_first) % self.z_rows * length;
+        start..start + length
+    }
+
+    /// Reads a row's depths.
+    #[inline(always)]
+    fn read_z(&mut self, points: &Points, order: LaneOrder, y: usize) {
+        let place = self.z_place(order, y);
+        let z = &mut self.z[place];
+        let (row, stride) = points.z_row(y);
+        // SAFETY: row y is inside the cloud, so it has a depth at every x below the width.
+        unsafe { order.read(row, stride, z) };
+        z[order.segment] = z[0].previous_lane(0.0);
+    }
+
     /// Bytes held.
     pub fn size(&self) -> usize {
-        let Sweep { z, z_below, tested, right, below, above, sides } = self;
-        let rows = [z, z_below, tested, right, below, above, sides];
-        rows.iter().map(|row| row.capacity() * size_of::<Lanes>()).sum()
+        let Sweep { z, tested, above, sides, .. } = self;
+        [z, tested, above, sides].iter().map(|row| row.capacity() * size_of::<Lanes>()).sum()
     }
 }
 
 /// Elements of a row of the map.
 pub(crate) fn row_length(width: usize) -> usize {
     LaneOrder::new(width).segment + 2
-}
-
-/// Reads a row's depths in lane order; the last element holds the following segments' first pixels.
-#[inline(always)]
-fn read_z(points: &Points, order: LaneOrder, y: usize, z: &mut [Lanes]) {
-    let (row, stride) = points.z_row(y);
-    // SAFETY: row y is inside the cloud, so it has a depth at every x below the width.
-    unsafe { order.read(row, stride, z) };
-    let first = z[0];
-    z[order.segment] =
-        Lanes(std::array::from_fn(|l| if l + 1 < LANES { first.0[l + 1] } else { 0.0 }));
 }
 
 impl<'a> WindowRows<'a> {
@@ -100,45 +116,36 @@ impl<'a> WindowRows<'a> {
         sweep: &mut Sweep,
     ) -> f32 {
         let order = self.order;
-        sweep.resize(order);
-        let mut largest = 0.0_f32;
+        let z_rows = if options.depth_dependent_smoothing { count + 2 } else { 2 };
+        let before = first.saturating_sub(1);
+        sweep.resize(order, z_rows, before);
+        let factor = options.max_depth_change_factor;
         let far = far(points.width(), points.height());
-        if first > 0 {
-            read_z(points, order, first - 1, &mut sweep.z);
-            read_z(points, order, first, &mut sweep.z_below);
-            // SAFETY: as the caller's.
-            unsafe { sweep.test_below::<S>(options.max_depth_change_factor) };
-            std::mem::swap(&mut sweep.below, &mut sweep.above);
-            std::mem::swap(&mut sweep.z, &mut sweep.z_below);
-        } else {
-            read_z(points, order, 0, &mut sweep.z);
-        }
-        for index in 0..count {
-            let y = first + index;
-            if y + 1 < points.height() {
-                read_z(points, order, y + 1, &mut sweep.z_below);
-                // SAFETY: as the caller's.
-                unsafe { sweep.test_below::<S>(options.max_depth_change_factor) };
-                // SAFETY: as the caller's.
-                unsafe { sweep.test_right::<S>(options.max_depth_change_factor) };
-            } else {
-                sweep.below.fill(Lanes::ZERO);
-                sweep.right.fill(Lanes::ZERO);
+        sweep.read_z(points, order, before);
+        let mut largest = Lanes::ZERO;
+        for y in before..first + count {
+            let last = y + 1 == points.height();
+            if !last {
+                sweep.read_z(points, order, y + 1);
             }
+            // The row before the first is only tested against the first.
+            let index = (y + 1).saturating_sub(first + 1);
+            let row = &mut self.row(index)[1..];
             // SAFETY: as the caller's.
-            largest = largest.max(unsafe { sweep.largest_z::<S>() });
-            // SAFETY: as the caller's.
-            unsafe { sweep.start_distances::<S>(far, &mut self.row(index)[1..]) };
-            if index > 0 {
-                let (above, row) = self.two_rows(index - 1);
-                // SAFETY: as the caller's.
-                unsafe { forward::<S>(order, above, row) };
+            unsafe {
+                if last {
+                    sweep.start_last_row::<S>(order, far, row);
+                } else {
+                    sweep.start_row::<S>(order, y, factor, far, row, &mut largest);
+                }
+                if y > first {
+                    let (above, row) = self.two_rows(index - 1);
+                    forward::<S>(order, above, row);
+                }
             }
             close_ends(self.row(index), far);
-            std::mem::swap(&mut sweep.below, &mut sweep.above);
-            std::mem::swap(&mut sweep.z, &mut sweep.z_below);
         }
-        largest
+        largest.0.into_iter().fold(0.0, f32::max)
     }
 
     /// The backward pass upwards over the swept rows, `first` being the image's row of the first; then the rows
@@ -188,101 +195,79 @@ fn floats_mut(row: &mut [Lanes]) -> &mut [f32] {
     unsafe { std::slice::from_raw_parts_mut(row.as_mut_ptr().cast(), row.len() * LANES) }
 }
 
-/// Where `z` and its `neighbour` are a depth change apart: `depth_change::is_depth_change`.
-#[inline(always)]
-unsafe fn test<S: Simd>(z: S::F, neighbour: S::F, factor: f32) -> S::F {
-    // SAFETY: as the caller's.
-    unsafe {
-        let slope = S::mul(S::splat(factor), S::add(S::abs(z), S::splat(1.0)));
-        let threshold = S::mul(slope, S::splat(2.0));
-        let apart = S::lt(threshold, S::abs(S::sub(z, neighbour)));
-        let finite = S::and(S::finite(z), S::finite(neighbour));
-        S::or(apart, S::and_not(finite, S::splat(f32::from_bits(!0))))
-    }
-}
-
 impl Sweep {
+    /// Depth changes of row `y`, from its depths and those of the next row: distance 0 at depth changes, `far`
+    /// elsewhere. Keeps the changes to the row below for the next row, and the largest magnitudes of finite depths.
+    ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn test_below<S: Simd>(&mut self, factor: f32) {
-        let length = self.below.len();
-        let (z, z_below) = (&self.z[..length], &self.z_below[..length]);
-        let (tested, below) = (&self.tested[..length], &mut self.below[..length]);
-        for k in 0..length {
-            // SAFETY: as the caller's.
-            unsafe {
-                let (z, z_below) = (z[k].load::<S>(), z_below[k].load::<S>());
-                let tested = tested[k].load::<S>();
-                below[k].store::<S>([
-                    S::and(test::<S>(z[0], z_below[0], factor), tested[0]),
-                    S::and(test::<S>(z[1], z_below[1], factor), tested[1]),
-                ]);
-            }
-        }
-    }
-
-    /// # Safety
-    /// As [`Sweep::test_below`].
-    #[inline(always)]
-    unsafe fn test_right<S: Simd>(&mut self, factor: f32) {
-        let length = self.right.len();
-        let (z, tested, right) =
-            (&self.z[..length], &self.tested[..length], &mut self.right[..length]);
-        for k in 0..length - 1 {
-            // SAFETY: as the caller's.
-            unsafe {
-                let (z, z_right) = (z[k].load::<S>(), z[k + 1].load::<S>());
-                let tested = tested[k].load::<S>();
-                right[k].store::<S>([
-                    S::and(test::<S>(z[0], z_right[0], factor), tested[0]),
-                    S::and(test::<S>(z[1], z_right[1], factor), tested[1]),
-                ]);
-            }
-        }
-    }
-
-    /// The largest magnitude of a finite depth in the row.
-    ///
-    /// # Safety
-    /// As [`Sweep::test_below`].
-    #[inline(always)]
-    unsafe fn largest_z<S: Simd>(&self) -> f32 {
-        let mut lanes = Lanes::ZERO;
-        // SAFETY: as the caller's.
-        unsafe {
-            let mut largest = lanes.load::<S>();
-            for z in &self.z {
-                let z = z.load::<S>();
-                for g in 0..2 {
-                    largest[g] = S::max(S::and(S::finite(z[g]), S::abs(z[g])), largest[g]);
-                }
-            }
-            lanes.store::<S>(largest);
-        }
-        lanes.0.into_iter().fold(0.0, f32::max)
-    }
-
-    /// Distance 0 at depth changes, `far` elsewhere.
-    ///
-    /// # Safety
-    /// As [`Sweep::test_below`].
-    #[inline(always)]
-    unsafe fn start_distances<S: Simd>(&self, far: f32, row: &mut [Lanes]) {
-        let segment = self.right.len() - 1;
-        let (right, below, above) =
-            (&self.right[..segment], &self.below[..segment], &self.above[..segment]);
+    unsafe fn start_row<S: Simd>(
+        &mut self,
+        order: LaneOrder,
+        y: usize,
+        factor: f32,
+        far: f32,
+        row: &mut [Lanes],
+        largest: &mut Lanes,
+    ) {
+        let segment = order.segment;
+        let (own, next) = (self.z_place(order, y), self.z_place(order, y + 1));
+        let (z, below) = (&self.z[own], &self.z[next]);
+        let (tested, above) = (&self.tested[..segment], &mut self.above[..segment]);
         let row = &mut row[..segment];
         // SAFETY: as the caller's.
         unsafe {
             let far = S::splat(far);
-            let mut left = right[segment - 1].next_lane(0.0).load::<S>();
+            let factor = S::splat(factor);
+            let mut most = largest.load::<S>();
+            let end = z[segment - 1].load::<S>();
+            let end_right = z[segment].load::<S>();
+            let mut ends = Lanes::ZERO;
+            for g in 0..2 {
+                let bound = threshold::<S>(end[g], factor);
+                let change = is_change::<S>(end[g], S::finite(end[g]), end_right[g], bound);
+                let tested = tested[segment - 1].load::<S>();
+                ends.store_group::<S>(g, S::and(change, tested[g]));
+            }
+            let mut left = ends.next_lane(0.0).load::<S>();
+            let mut own = z[0].load::<S>();
             for k in 0..segment {
-                let (own, below, above) =
-                    (right[k].load::<S>(), below[k].load::<S>(), above[k].load::<S>());
-                let change = |g: usize| S::or(S::or(own[g], left[g]), S::or(below[g], above[g]));
-                row[k].store::<S>([S::and_not(change(0), far), S::and_not(change(1), far)]);
-                left = own;
+                let right = z[k + 1].load::<S>();
+                let (lower, upper) = (below[k].load::<S>(), above[k].load::<S>());
+                let tested = tested[k].load::<S>();
+                for g in 0..2 {
+                    let finite = S::finite(own[g]);
+                    most[g] = S::max(S::and(finite, S::abs(own[g])), most[g]);
+                    let bound = threshold::<S>(own[g], factor);
+                    let to_right =
+                        S::and(is_change::<S>(own[g], finite, right[g], bound), tested[g]);
+                    let to_lower =
+                        S::and(is_change::<S>(own[g], finite, lower[g], bound), tested[g]);
+                    let change = S::or(S::or(to_right, left[g]), S::or(to_lower, upper[g]));
+                    row[k].store_group::<S>(g, S::and_not(change, far));
+                    above[k].store_group::<S>(g, to_lower);
+                    left[g] = to_right;
+                }
+                own = right;
+            }
+            largest.store_group::<S>(0, most[0]);
+            largest.store_group::<S>(1, most[1]);
+        }
+    }
+
+    /// The image's last row: only the row above was tested against it.
+    ///
+    /// # Safety
+    /// As [`Sweep::start_row`].
+    #[inline(always)]
+    unsafe fn start_last_row<S: Simd>(&self, order: LaneOrder, far: f32, row: &mut [Lanes]) {
+        for (row, above) in row[..order.segment].iter_mut().zip(&self.above) {
+            // SAFETY: as the caller's.
+            unsafe {
+                let above = above.load::<S>();
+                row.store_group::<S>(0, S::and_not(above[0], S::splat(far)));
+                row.store_group::<S>(1, S::and_not(above[1], S::splat(far)));
             }
         }
     }
@@ -301,11 +286,8 @@ impl Sweep {
         row: &mut [Lanes],
     ) {
         let segment = order.segment;
-        if options.depth_dependent_smoothing {
-            read_z(points, order, y, &mut self.z);
-        }
-        let (distances, z, sides) =
-            (&row[1..=segment], &self.z[..segment], &mut self.sides[..segment]);
+        let place = self.z_place(order, y);
+        let (distances, z, sides) = (&row[1..=segment], &self.z[place], &mut self.sides[..segment]);
         // SAFETY: as the caller's; the sides fit i32.
         unsafe {
             let size = S::splat(options.normal_smoothing_size);
@@ -325,10 +307,8 @@ impl Sweep {
                         size
                     }
                 };
-                sides[k].store::<S>([
-                    side(distances[0], smoothing(0)),
-                    side(distances[1], smoothing(1)),
-                ]);
+                sides[k].store_group::<S>(0, side(distances[0], smoothing(0)));
+                sides[k].store_group::<S>(1, side(distances[1], smoothing(1)));
             }
         }
         let row = floats_mut(row);
@@ -343,6 +323,30 @@ impl Sweep {
         }
         row[..border].fill(0.0);
         row[order.width - border..order.width].fill(0.0);
+    }
+}
+
+/// `depth_change::threshold`
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn threshold<S: Simd>(z: S::F, factor: S::F) -> S::F {
+    // SAFETY: as the caller's.
+    unsafe { S::mul(S::mul(factor, S::add(S::abs(z), S::splat(1.0))), S::splat(2.0)) }
+}
+
+/// `depth_change::is_depth_change`, where `finite` says whether `z` is.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn is_change<S: Simd>(z: S::F, finite: S::F, neighbour: S::F, threshold: S::F) -> S::F {
+    // SAFETY: as the caller's.
+    unsafe {
+        let apart = S::lt(threshold, S::abs(S::sub(z, neighbour)));
+        let finite = S::and(finite, S::finite(neighbour));
+        S::or(apart, S::and_not(finite, S::splat(f32::from_bits(!0))))
     }
 }
 
@@ -402,12 +406,14 @@ unsafe fn forward<S: Simd>(order: LaneOrder, above: &[Lanes], row: &mut [Lanes])
     // SAFETY: as the caller's.
     unsafe {
         let start = nearest::<S>(&row[1], three(above, 1));
-        row[1].store::<S>(start);
+        row[1].store_group::<S>(0, start[0]);
+        row[1].store_group::<S>(1, start[1]);
         row[1].0[0] = first; // column 0 stays
         let mut left = row[1].load::<S>();
         for at in 2..=segment {
             left = along::<S>(nearest::<S>(&row[at], three(above, at)), left);
-            row[at].store::<S>(left);
+            row[at].store_group::<S>(0, left[0]);
+            row[at].store_group::<S>(1, left[1]);
         }
     }
     for lane in 1..LANES {
@@ -432,13 +438,15 @@ unsafe fn backward<S: Simd>(order: LaneOrder, row: &mut [Lanes], below: &[Lanes]
         let mut right = [S::splat(far); 2];
         for at in (last_element + 1..=segment).rev() {
             right = along::<S>(nearest::<S>(&row[at], three(below, at)), right);
-            row[at].store::<S>(right);
+            row[at].store_group::<S>(0, right[0]);
+            row[at].store_group::<S>(1, right[1]);
         }
         row[last_element + 1].0[last_lane] = last; // the last column stays
         right = row[last_element + 1].load::<S>();
         for at in (1..=last_element).rev() {
             right = along::<S>(nearest::<S>(&row[at], three(below, at)), right);
-            row[at].store::<S>(right);
+            row[at].store_group::<S>(0, right[0]);
+            row[at].store_group::<S>(1, right[1]);
         }
     }
     for lane in (0..last_lane).rev() {
