@@ -462,6 +462,24 @@ impl<'a> Normals<'a> {
     }
 }
 
+/// Asks for the cache lines that will be written a few groups later: normals are so far apart that stores would wait
+/// for their lines one by one.
+#[inline(always)]
+fn prefetch_for_writing(at: *mut f32, point_stride: usize) {
+    #[cfg(target_arch = "x86_64")]
+    for pair in 0..4 {
+        use std::arch::x86_64::{_MM_HINT_ET0, _mm_prefetch};
+        let ahead = at.wrapping_byte_add((PIXELS_AHEAD + 2 * pair) * point_stride);
+        // SAFETY: a prefetch reads and writes nothing, whatever the address.
+        unsafe { _mm_prefetch::<_MM_HINT_ET0>(ahead.cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (at, point_stride);
+}
+
+/// How far ahead lines are asked for; found by trying 16 to 128 on 640x480.
+const PIXELS_AHEAD: usize = 48;
+
 /// Stores the first two floats.
 ///
 /// # Safety
@@ -489,6 +507,7 @@ impl Normals<'_> {
     ) {
         let (first, step) = (self.grid.offset(x, y), self.grid.point_stride);
         let [nx, ny, nz] = self.normal.map(|field| field.wrapping_byte_add(first));
+        prefetch_for_writing(nx, step);
         // SAFETY: as the caller's.
         unsafe {
             #[cfg(target_arch = "x86_64")]

@@ -63,6 +63,7 @@ impl Sums for HalfWindows {
     type Of1 = Tangents<f32>;
 
     const COLUMN: usize = size_of::<f64>();
+    const CURVATURE: bool = false;
 
     fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, _origin: [f32; 3]) {
         grow(&mut self.integrals, frame.ring * frame.stride);

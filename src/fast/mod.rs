@@ -79,7 +79,6 @@ impl Scratch {
 impl WorkerScratch {
     fn size(&self) -> usize {
         self.sweep.size()
-            + self.frame.size()
             + self.planes.size()
             + self.moments.size()
             + self.strips.size()
@@ -266,8 +265,8 @@ impl Job<'_> {
                 Method::AverageDepthChange => HalfWindows::COLUMN,
                 Method::Simple3DGradient => Strips::<true>::COLUMN,
             };
-        let ring = reach + 2;
-        let columns = (TILE_BYTES / (column * ring)).max(2 * ring).next_multiple_of(2 * GROUP);
+        let ring = (reach + 2).next_power_of_two();
+        let columns = (TILE_BYTES / (column * ring)).max(2 * reach).next_multiple_of(2 * GROUP);
         let across = width.div_ceil(columns);
         // Tiles of like widths.
         let columns = width.div_ceil(across).next_multiple_of(GROUP);

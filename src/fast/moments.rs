@@ -61,6 +61,7 @@ impl Sums for Moments {
     type Of1 = WindowMoments<f64>;
 
     const COLUMN: usize = CHANNELS * size_of::<f64>();
+    const CURVATURE: bool = true;
 
     fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, origin: [f32; 3]) {
         grow(&mut self.integrals, CHANNELS * frame.ring * frame.stride);

@@ -15,21 +15,17 @@ pub(crate) struct Frame {
     pub columns: Range<usize>,
     /// Elements from a row to the next.
     pub stride: usize,
-    /// Rows in a ring.
+    /// Rows in a ring, a power of two.
     pub ring: usize,
     /// The image's rows that are pushed through the rings.
     pub rows: Range<usize>,
-    /// The row before or at the ring's for every row from `rows.start` on: its place in the ring.
-    places: Vec<usize>,
 }
 
 impl Frame {
     pub fn set(&mut self, columns: Range<usize>, rows: Range<usize>, ring: usize) {
         debug_assert!(columns.start.is_multiple_of(GROUP));
         self.stride = (columns.len() + 2 * MARGIN).next_multiple_of(GROUP) + MARGIN;
-        self.ring = ring;
-        self.places.clear();
-        self.places.extend((0..rows.len()).map(|row| row % ring));
+        self.ring = ring.next_power_of_two();
         self.columns = columns;
         self.rows = rows;
     }
@@ -42,17 +38,13 @@ impl Frame {
     /// The ring's row in which row `y` is held while it is.
     #[inline(always)]
     pub fn place(&self, y: usize) -> usize {
-        self.places[y - self.rows.start]
+        y & (self.ring - 1)
     }
 
     /// Index of column `x` in a row; `x` may be up to the margin before the columns.
     #[inline(always)]
     pub fn column(&self, x: usize) -> usize {
         x.wrapping_add(MARGIN).wrapping_sub(self.columns.start)
-    }
-
-    pub fn size(&self) -> usize {
-        self.places.capacity() * size_of::<usize>()
     }
 }
 
@@ -87,11 +79,17 @@ impl Planes {
         self.data.capacity() * size_of::<f32>()
     }
 
-    /// The start of row `y`'s plane of coordinate `c`.
+    /// Row `y`'s plane of coordinate `c`.
     #[inline(always)]
     pub fn row(&self, frame: &Frame, c: usize, y: usize) -> &[f32] {
         let start = (frame.place(y) * 3 + c) * frame.stride;
         &self.data[start..start + frame.stride]
+    }
+
+    /// Row `y`'s planes.
+    #[inline(always)]
+    pub fn rows(&self, frame: &Frame, y: usize) -> [&[f32]; 3] {
+        [self.row(frame, 0, y), self.row(frame, 1, y), self.row(frame, 2, y)]
     }
 
     /// Reads row `y` of the points.

@@ -32,18 +32,20 @@ impl Sink<'_> {
         }
     }
 
-    /// Writes the first `count` of eight normals, for the pixels from `(x, y)` on.
+    /// Writes the first `count` of eight normals, for the pixels from `(x, y)` on. Without `curvature` all of them are
+    /// known to be NaN.
     ///
     /// # Safety
     /// The pixels are inside the image, and no other thread writes them.
     #[inline(always)]
-    pub unsafe fn write(&self, x: usize, y: usize, count: usize, octet: &Octet) {
+    pub unsafe fn write(&self, x: usize, y: usize, count: usize, octet: &Octet, curvature: bool) {
         let normal = |lane: usize| octet.normal.map(|c| c[lane]);
         match self {
             // SAFETY: as the caller's.
             Sink::All(normals) => unsafe {
                 if count == GROUP {
-                    normals.write_group(x, y, &octet.normal, &octet.curvature);
+                    let curvature = if curvature { &octet.curvature } else { &[f32::NAN; GROUP] };
+                    normals.write_group(x, y, &octet.normal, curvature);
                 } else {
                     for lane in 0..count {
                         normals.write(x + lane, y, normal(lane), octet.curvature[lane]);

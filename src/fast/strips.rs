@@ -59,6 +59,7 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     type Of1 = Gradients<i32>;
 
     const COLUMN: usize = 6 * size_of::<i32>();
+    const CURVATURE: bool = false;
 
     fn start(&mut self, frame: &Frame, limit: f32, side: usize, _origin: [f32; 3]) {
         for ring in [&mut self.columns, &mut self.rows] {

@@ -31,6 +31,9 @@ pub(crate) trait Sums {
     /// Bytes a column of a ring's row takes.
     const COLUMN: usize;
 
+    /// Whether the method gives a curvature.
+    const CURVATURE: bool;
+
     /// Makes room, and forgets the rows pushed before. `limit` bounds the coordinates, `side` the windows.
     fn start(&mut self, frame: &Frame, limit: f32, side: usize, origin: [f32; 3]);
 
@@ -220,6 +223,7 @@ impl Tile<'_> {
         hidden: bool,
     ) {
         let row = sides(y);
+        let planes_row = planes.rows(frame, y);
         for group in 0..self.columns.len().div_ceil(GROUP) {
             let x = self.columns.start + group * GROUP;
             let lanes = (self.columns.end - x).min(GROUP);
@@ -232,34 +236,28 @@ impl Tile<'_> {
                     sink.write_none(x, y, lanes);
                     continue;
                 }
-                let mut normals = Octet::none();
-                let plain = if hidden {
-                    windows
-                } else {
-                    let (of8, plain) = self.group::<S, M>(
-                        frame,
-                        planes,
-                        sums,
-                        sides,
-                        (x, y),
-                        group_sides,
-                        windows,
-                    );
-                    let found = sums.estimate::<S>(frame, &of8, group_sides);
-                    let plain = plain | found.doubtful & windows;
-                    let column = frame.column(x);
-                    let point = [
-                        Floats(S::load(planes.row(frame, 0, y).as_ptr().add(column))),
-                        Floats(S::load(planes.row(frame, 1, y).as_ptr().add(column))),
-                        Floats(S::load(planes.row(frame, 2, y).as_ptr().add(column))),
-                    ];
-                    normals.set::<S>(&found, point, self.options.viewpoint, windows & !plain);
-                    plain
-                };
+                if hidden {
+                    let mut normals = Octet::none();
+                    self.plain_lanes(&mut normals, &row[x..x + lanes], (x, y), windows);
+                    sink.write(x, y, lanes, &normals, true);
+                    continue;
+                }
+                let group = Group::<S> { x, y, row, sides: group_sides, windows };
+                let (of8, plain) = self.group::<S, M>(frame, planes, sums, sides, &group);
+                let found = sums.estimate::<S>(frame, &of8, group_sides);
+                let plain = plain | found.doubtful & windows;
+                let column = frame.column(x);
+                let point = [
+                    Floats(S::load(planes_row[0].as_ptr().add(column))),
+                    Floats(S::load(planes_row[1].as_ptr().add(column))),
+                    Floats(S::load(planes_row[2].as_ptr().add(column))),
+                ];
+                let mut normals =
+                    Octet::of::<S>(&found, point, self.options.viewpoint, windows & !plain);
                 if plain != 0 {
                     self.plain_lanes(&mut normals, &row[x..x + lanes], (x, y), plain);
                 }
-                sink.write(x, y, lanes, &normals);
+                sink.write(x, y, lanes, &normals, M::CURVATURE);
             }
         }
     }
@@ -282,57 +280,88 @@ impl Tile<'_> {
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
     unsafe fn group<'r, S: Simd, M: Sums>(
         &self,
         frame: &Frame,
         planes: &Planes,
         sums: &M,
         sides: &impl Fn(usize) -> &'r [f32],
-        (x, y): (usize, usize),
-        group: S::F,
-        windows: u32,
+        group: &Group<S>,
     ) -> (M::Of8<S>, u32) {
-        let Image { width, height, .. } = *self.image;
-        let row = sides(y);
-        // SAFETY: as the caller's.
-        let mut of8 = unsafe { M::none::<S>() };
-        let (mut plain, mut todo) = (0, windows);
-        while todo != 0 {
-            let first = todo.trailing_zeros() as usize;
-            let side = row[x + first];
-            // SAFETY: as the caller's.
-            let same = unsafe { S::bits(S::eq(group, S::splat(side))) } & todo;
+        let (mut plain, mut todo) = (0, group.windows);
+        // SAFETY: as the caller's; the frame holds the largest side around every pixel of the tile.
+        unsafe {
+            let (same, side) = group.next_windows(todo);
             todo &= !same;
-            let side = side as usize;
-            // AVERAGE_DEPTH_CHANGE reaches one pixel further than the window.
-            let (half, rest) = (side / 2, side / 2 + 1);
-            let last = (u32::BITS - 1 - same.leading_zeros()) as usize;
-            let inside_row = x + first > half && x + last + rest < width;
-            let inside = inside_row && y > half && y + rest < height;
-            if inside {
-                // SAFETY: as the caller's; the frame holds `self.side` around every pixel of the tile.
-                unsafe {
-                    let these = sums.of_group::<S>(frame, planes, x, y, side);
-                    of8 = if same == windows { these } else { M::select::<S>(same, these, of8) };
-                }
-                continue;
-            }
-            for lane in Bits(same) {
-                let pixel = (x + lane, y);
-                let one = if self.has_only_finite(pixel, side, sides) {
-                    sums.of_mirrored(frame, planes, self.image, pixel, side)
+            let mut of8 = if self.is_inside(group, same, side) {
+                sums.of_group::<S>(frame, planes, group.x, group.y, side)
+            } else {
+                let mut of8 = M::none::<S>();
+                plain |=
+                    self.crossing::<S, M>(frame, planes, sums, sides, group, same, side, &mut of8);
+                of8
+            };
+            while todo != 0 {
+                let (same, side) = group.next_windows(todo);
+                todo &= !same;
+                if self.is_inside(group, same, side) {
+                    let these = sums.of_group::<S>(frame, planes, group.x, group.y, side);
+                    of8 = M::select::<S>(same, these, of8);
                 } else {
-                    None
-                };
-                match one {
-                    // SAFETY: as the caller's.
-                    Some(one) => unsafe { M::put::<S>(&mut of8, lane, one) },
-                    None => plain |= 1 << lane,
+                    plain |= self
+                        .crossing::<S, M>(frame, planes, sums, sides, group, same, side, &mut of8);
                 }
+            }
+            (of8, plain)
+        }
+    }
+
+    /// Whether the windows of some lanes, and the pixels around them, are inside the image.
+    #[inline(always)]
+    fn is_inside<S: Simd>(&self, group: &Group<S>, lanes: u32, side: usize) -> bool {
+        let Image { width, height, .. } = *self.image;
+        let first = lanes.trailing_zeros() as usize;
+        let last = (u32::BITS - 1 - lanes.leading_zeros()) as usize;
+        // AVERAGE_DEPTH_CHANGE reaches one pixel further than the window.
+        let (half, rest) = (side / 2, side / 2 + 1);
+        group.x + first > half
+            && group.x + last + rest < width
+            && group.y > half
+            && group.y + rest < height
+    }
+
+    /// Puts the sums of windows that cross the border of the image; returns the lanes left to the plain form.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[cold]
+    #[allow(clippy::too_many_arguments)]
+    unsafe fn crossing<'r, S: Simd, M: Sums>(
+        &self,
+        frame: &Frame,
+        planes: &Planes,
+        sums: &M,
+        sides: &impl Fn(usize) -> &'r [f32],
+        group: &Group<S>,
+        lanes: u32,
+        side: usize,
+        of8: &mut M::Of8<S>,
+    ) -> u32 {
+        let mut plain = 0;
+        for lane in Bits(lanes) {
+            let pixel = (group.x + lane, group.y);
+            let one = if self.has_only_finite(pixel, side, sides) {
+                sums.of_mirrored(frame, planes, self.image, pixel, side)
+            } else {
+                None
+            };
+            match one {
+                // SAFETY: as the caller's.
+                Some(one) => unsafe { M::put::<S>(of8, lane, one) },
+                None => plain |= 1 << lane,
             }
         }
-        (of8, plain)
+        plain
     }
 
     /// Whether a mirrored window certainly holds finite points only.
@@ -351,6 +380,34 @@ impl Tile<'_> {
         }
         let inner = (x.clamp(1, width - 2), y.clamp(1, height - 2));
         inner == (x, y) || sides(inner.1)[inner.0] as usize >= side
+    }
+}
+
+/// Eight pixels of a row and their windows.
+struct Group<'a, S: Simd> {
+    /// The first pixel.
+    x: usize,
+    y: usize,
+    /// The row's sides of windows, and the eight pixels'.
+    row: &'a [f32],
+    sides: S::F,
+    /// The lanes that have a window.
+    windows: u32,
+}
+
+impl<S: Simd> Group<'_, S> {
+    /// The first of the lanes `todo` and those with windows of the same side; and that side.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn next_windows(&self, todo: u32) -> (u32, usize) {
+        let side = self.row[self.x + todo.trailing_zeros() as usize];
+        // SAFETY: as the caller's; sides are whole numbers that fit i32.
+        unsafe {
+            let same = S::bits(S::eq(self.sides, S::splat(side))) & todo;
+            (same, side.to_int_unchecked::<i32>() as usize)
+        }
     }
 }
 
@@ -389,18 +446,17 @@ impl Octet {
         self.curvature[lane] = estimate.curvature;
     }
 
-    /// Takes what was found for `lanes`, turned to the viewpoint: `orientation::turn_to_viewpoint`.
+    /// What was found for `lanes`, turned to the viewpoint: `orientation::turn_to_viewpoint`.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn set<S: Simd>(
-        &mut self,
+    unsafe fn of<S: Simd>(
         found: &Found<S>,
         point: [Floats<S>; 3],
         viewpoint: [f32; 3],
         lanes: u32,
-    ) {
+    ) -> Self {
         // SAFETY: as the caller's; the arrays hold a group each.
         unsafe {
             let [x, y, z] = viewpoint;
@@ -411,10 +467,14 @@ impl Octet {
             let flip = S::and(S::lt(cosine.0, S::splat(0.0)), S::splat(-0.0));
             let mask = S::mask(lanes);
             let none = S::splat(f32::NAN);
-            for (to, normal) in self.normal.iter_mut().zip(found.normal) {
-                S::store(to.as_mut_ptr(), S::select(mask, S::xor(normal.0, flip), none));
+            let mut octet = std::mem::MaybeUninit::<Octet>::uninit();
+            let to = octet.as_mut_ptr().cast::<f32>();
+            for c in 0..3 {
+                let normal = S::select(mask, S::xor(found.normal[c].0, flip), none);
+                S::store(to.add(c * GROUP), normal);
             }
-            S::store(self.curvature.as_mut_ptr(), S::select(mask, found.curvature.0, none));
+            S::store(to.add(3 * GROUP), S::select(mask, found.curvature.0, none));
+            octet.assume_init()
         }
     }
 }
