@@ -14,9 +14,11 @@ const CHANNELS: usize = 9;
 #[derive(Debug, Default)]
 pub(crate) struct Moments {
     integrals: Vec<f64>,
+    /// The row pushed last, less the origin.
+    centered: Vec<f64>,
     origin: [f32; 3],
-    /// The place of the row pushed last.
-    last: Option<usize>,
+    /// The place of the row pushed last; before the first the one after the ring, which is zero.
+    last: usize,
     /// What the sums' rounding errors stay below.
     error: f64,
 }
@@ -50,9 +52,10 @@ const DOUBT_SUMS: f64 = 1e5;
 const DOUBT_PLANE: f64 = 1e-9;
 
 impl Moments {
+    /// Where the row at a place of the ring starts; its planes are a stride apart.
     #[inline(always)]
-    fn plane(frame: &Frame, c: usize, place: usize) -> usize {
-        (place * CHANNELS + c) * frame.stride
+    fn start_of(frame: &Frame, place: usize) -> usize {
+        place * CHANNELS * frame.stride
     }
 }
 
@@ -64,58 +67,51 @@ impl Sums for Moments {
     const CURVATURE: bool = true;
 
     fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, origin: [f32; 3]) {
-        grow(&mut self.integrals, CHANNELS * frame.ring * frame.stride);
+        let zero = Self::start_of(frame, frame.ring)..Self::start_of(frame, frame.ring + 1);
+        grow(&mut self.integrals, zero.end);
+        self.integrals[zero].fill(0.0);
+        grow(&mut self.centered, 3 * frame.stride);
         self.origin = origin;
-        self.last = None;
+        self.last = frame.ring;
     }
 
     fn size(&self) -> usize {
-        self.integrals.capacity() * size_of::<f64>()
+        (self.integrals.capacity() + self.centered.capacity()) * size_of::<f64>()
     }
 
     #[inline(always)]
     unsafe fn push<S: Simd>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
         let place = frame.place(y);
         let groups = frame.groups() + 1;
-        assert!(MARGIN + groups * GROUP <= frame.stride);
-        assert!(Self::plane(frame, CHANNELS, place) <= self.integrals.len());
-        let from = [0, 1, 2].map(|c| planes.row(frame, c, y).as_ptr());
-        let integrals = self.integrals.as_mut_ptr();
-        // SAFETY: as the caller's; the groups lie inside the planes of the ring, as was just checked.
+        let (stride, plane) = (frame.stride, 3 * frame.stride);
+        assert!(MARGIN + groups * GROUP <= stride && plane <= self.centered.len());
+        assert!(Self::start_of(frame, frame.ring + 1) <= self.integrals.len());
+        let from = planes.rows(frame, y);
+        let centered = self.centered.as_mut_ptr();
+        let above = self.integrals.as_ptr().wrapping_add(Self::start_of(frame, self.last));
+        let row = self.integrals.as_mut_ptr().wrapping_add(Self::start_of(frame, place));
+        // SAFETY: as the caller's; the groups lie inside the planes and rows, whose lengths were just checked.
         unsafe {
-            let [origin_x, origin_y, origin_z] = self.origin;
-            let origin = [
-                Floats::<S>::splat(origin_x).widen(),
-                Floats::splat(origin_y).widen(),
-                Floats::splat(origin_z).widen(),
-            ];
-            let mut carry = [S::splat_d(0.0); CHANNELS];
-            for c in 0..CHANNELS {
-                *integrals.add(Self::plane(frame, c, place) + MARGIN - 1) = 0.0;
-            }
-            for group in 0..groups {
-                let at = MARGIN + group * GROUP;
-                let x = Floats(S::load(from[0].add(at))).widen() - origin[0];
-                let y = Floats(S::load(from[1].add(at))).widen() - origin[1];
-                let z = Floats(S::load(from[2].add(at))).widen() - origin[2];
-                let moments = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
-                for c in 0..CHANNELS {
-                    let along = S::add_d(S::prefix_sum_d(moments[c].0), carry[c]);
-                    carry[c] = S::last_d(along);
-                    let sum = match self.last {
-                        Some(last) => {
-                            let above = integrals.add(Self::plane(frame, c, last) + at);
-                            S::add_d(along, S::load_d(above))
-                        }
-                        None => along,
-                    };
-                    S::store_d(integrals.add(Self::plane(frame, c, place) + at), sum);
+            for c in 0..3 {
+                let origin = Floats::<S>::splat(self.origin[c]).widen();
+                for group in 0..groups {
+                    let at = MARGIN + group * GROUP;
+                    let coordinate = Floats::<S>(S::load(from[c].as_ptr().add(at))).widen();
+                    S::store_d(centered.add(c * stride + at), (coordinate - origin).0);
                 }
             }
+            let coordinate = |c: usize| centered.wrapping_add(c * stride).cast_const();
+            for c in 0..3 {
+                integrate::<S, 1>([coordinate(c)], above, row, c * stride, groups);
+            }
+            let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+            for (c, (a, b)) in (3..).zip(pairs) {
+                integrate::<S, 2>([coordinate(a), coordinate(b)], above, row, c * stride, groups);
+            }
         }
-        self.last = Some(place);
-        let end = MARGIN + groups * GROUP - 1;
-        let square = |c| self.integrals[Self::plane(frame, c, place) + end];
+        self.last = place;
+        let end = Self::start_of(frame, place) + MARGIN + groups * GROUP - 1;
+        let square = |c: usize| self.integrals[end + c * stride];
         self.error = ROUNDING * (square(3) + square(6) + square(8));
     }
 
@@ -130,18 +126,17 @@ impl Sums for Moments {
     ) -> Self::Of8<S> {
         let half = side / 2;
         let left = frame.column(x.wrapping_sub(half + 1));
-        let right = left + side;
-        let (top, bottom) = (frame.place(y - half - 1), frame.place(y - half + side - 1));
         let integrals = self.integrals.as_ptr();
         // SAFETY: as the caller's: rows and columns are held, and so are the groups from these columns on.
         unsafe {
+            let top = integrals.add(Self::start_of(frame, frame.place(y - half - 1)) + left);
+            let bottom =
+                integrals.add(Self::start_of(frame, frame.place(y - half + side - 1)) + left);
             let mut sums = [Doubles::splat(0.0); CHANNELS];
             for c in 0..CHANNELS {
-                let top = integrals.add(Self::plane(frame, c, top));
-                let bottom = integrals.add(Self::plane(frame, c, bottom));
-                let lower =
-                    Doubles(S::load_d(bottom.add(right))) - Doubles(S::load_d(bottom.add(left)));
-                let upper = Doubles(S::load_d(top.add(right))) - Doubles(S::load_d(top.add(left)));
+                let (top, bottom) = (top.add(c * frame.stride), bottom.add(c * frame.stride));
+                let lower = Doubles(S::load_d(bottom.add(side))) - Doubles(S::load_d(bottom));
+                let upper = Doubles(S::load_d(top.add(side))) - Doubles(S::load_d(top));
                 sums[c] = lower - upper;
             }
             WindowMoments { sums, count: Doubles::splat((side * side) as f64) }
@@ -189,7 +184,8 @@ impl Sums for Moments {
                     if end_row == 0 {
                         return 0.0;
                     }
-                    let row = Self::plane(frame, c, frame.place(end_row - 1));
+                    let place = frame.place(end_row - 1);
+                    let row = Self::start_of(frame, place) + c * frame.stride;
                     self.integrals[row + frame.column(rect.x.end) - 1]
                         - self.integrals[row + frame.column(rect.x.start) - 1]
                 };
@@ -280,6 +276,35 @@ impl Sums for Moments {
                 curvature: value.narrow(),
                 doubtful: !sure | unsettled,
             }
+        }
+    }
+}
+
+/// One plane of an integral row (Eq. 2) of the products of `FACTORS` rows.
+///
+/// # Safety
+/// The processor has the instruction set of `S`; the groups are inside the rows, and in the planes after the margin.
+#[inline(always)]
+unsafe fn integrate<S: Simd, const FACTORS: usize>(
+    factors: [*const f64; FACTORS],
+    above: *const f64,
+    row: *mut f64,
+    plane: usize,
+    groups: usize,
+) {
+    // SAFETY: as the caller's.
+    unsafe {
+        row.add(plane + MARGIN - 1).write(0.0);
+        let mut carry = S::splat_d(0.0);
+        for group in 0..groups {
+            let at = MARGIN + group * GROUP;
+            let mut product = S::load_d(factors[0].add(at));
+            if FACTORS == 2 {
+                product = S::mul_d(product, S::load_d(factors[1].add(at)));
+            }
+            let along = S::add_d(S::prefix_sum_d(product), carry);
+            carry = S::last_d(along);
+            S::store_d(row.add(plane + at), S::add_d(along, S::load_d(above.add(plane + at))));
         }
     }
 }
