@@ -215,6 +215,7 @@ impl Sums for Moments {
         _frame: &Frame,
         moments: &Self::Of8<S>,
         _sides: S::F,
+        lanes: u32,
     ) -> Found<S> {
         // SAFETY: as the caller's.
         unsafe {
@@ -248,7 +249,7 @@ impl Sums for Moments {
                 slope = (three * value - two) * value + c1;
                 let step = (((value - one) * value + c1) * value - c0) / slope;
                 value = value - step;
-                unsettled = !step.max(zero - step).lt(converged * slope) & 0xff;
+                unsettled = !step.max(zero - step).lt(converged * slope) & lanes;
                 if unsettled == 0 {
                     break;
                 }

@@ -89,12 +89,17 @@ pub(crate) trait Sums {
     /// As [`Sums::push`].
     unsafe fn put<S: Simd>(sums: &mut Self::Of8<S>, lane: usize, one: Self::Of1);
 
-    /// The estimates from the sums; `sides` are the sides of the windows.
+    /// The estimates from the sums; `sides` are the sides of the windows, of which only `lanes` count.
     ///
     /// # Safety
     /// As [`Sums::push`].
-    unsafe fn estimate<S: Simd>(&self, frame: &Frame, sums: &Self::Of8<S>, sides: S::F)
-    -> Found<S>;
+    unsafe fn estimate<S: Simd>(
+        &self,
+        frame: &Frame,
+        sums: &Self::Of8<S>,
+        sides: S::F,
+        lanes: u32,
+    ) -> Found<S>;
 }
 
 /// What a tile is computed from.
@@ -244,7 +249,7 @@ impl Tile<'_> {
                 }
                 let group = Group::<S> { x, y, row, sides: group_sides, windows };
                 let (of8, plain) = self.group::<S, M>(frame, planes, sums, sides, &group);
-                let found = sums.estimate::<S>(frame, &of8, group_sides);
+                let found = sums.estimate::<S>(frame, &of8, group_sides, windows);
                 let plain = plain | found.doubtful & windows;
                 let column = frame.column(x);
                 let point = [
