@@ -3,6 +3,7 @@
 use super::arithmetic::{Doubles, Floats, cross, dot};
 use super::planes::{Frame, MARGIN, Planes, grow};
 use super::tile::{Found, Sums};
+use crate::simd::twice::Twice;
 use crate::simd::{GROUP, Simd};
 use crate::window::Image;
 
@@ -148,6 +149,14 @@ impl Sums for HalfWindows {
             }
         }
         tangents
+    }
+
+    #[inline(always)]
+    fn pair<S: Simd>(first: Self::Of8<S>, second: Self::Of8<S>) -> Self::Of8<Twice<S>> {
+        let both = |a: Floats<S>, b: Floats<S>| Floats([a.0, b.0]);
+        let [[a, b, c], [d, e, f]] = first;
+        let [[g, h, i], [j, k, l]] = second;
+        [[both(a, g), both(b, h), both(c, i)], [both(d, j), both(e, k), both(f, l)]]
     }
 
     #[inline(always)]

@@ -4,6 +4,7 @@
 use super::arithmetic::{Doubles, Floats, dot};
 use super::planes::{Frame, MARGIN, Planes, grow};
 use super::tile::{Found, Sums};
+use crate::simd::twice::Twice;
 use crate::simd::{GROUP, Simd};
 use crate::window::Image;
 
@@ -155,6 +156,16 @@ impl Sums for Moments {
             moments.count = Doubles(S::select_bits_d(lanes, yes.count.0, no.count.0));
         }
         moments
+    }
+
+    #[inline(always)]
+    fn pair<S: Simd>(first: Self::Of8<S>, second: Self::Of8<S>) -> Self::Of8<Twice<S>> {
+        let both = |a: Doubles<S>, b: Doubles<S>| Doubles([a.0, b.0]);
+        let mut sums = [both(first.sums[0], second.sums[0]); CHANNELS];
+        for c in 1..CHANNELS {
+            sums[c] = both(first.sums[c], second.sums[c]);
+        }
+        WindowMoments { sums, count: both(first.count, second.count) }
     }
 
     #[inline(always)]

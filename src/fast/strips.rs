@@ -8,6 +8,7 @@
 use super::arithmetic::{Floats, cross, dot};
 use super::planes::{Frame, MARGIN, Planes, grow};
 use super::tile::{Found, Sums};
+use crate::simd::twice::Twice;
 use crate::simd::{GROUP, Simd};
 use crate::window::Image;
 
@@ -168,6 +169,13 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
             }
         }
         sums
+    }
+
+    #[inline(always)]
+    fn pair<S: Simd>(first: Self::Of8<S>, second: Self::Of8<S>) -> Self::Of8<Twice<S>> {
+        let [[a, b, c], [d, e, f]] = first;
+        let [[g, h, i], [j, k, l]] = second;
+        [[[a, g], [b, h], [c, i]], [[d, j], [e, k], [f, l]]]
     }
 
     #[inline(always)]

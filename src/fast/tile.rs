@@ -10,6 +10,7 @@ use crate::cloud::Points;
 use crate::methods::{Estimate, estimate};
 use crate::options::{BorderPolicy, Options};
 use crate::orientation::turn_to_viewpoint;
+use crate::simd::twice::Twice;
 use crate::simd::{GROUP, Simd};
 use crate::window::Image;
 
@@ -76,6 +77,9 @@ pub(crate) trait Sums {
         pixel: (usize, usize),
         side: usize,
     ) -> Option<Self::Of1>;
+
+    /// Two groups' sums.
+    fn pair<S: Simd>(first: Self::Of8<S>, second: Self::Of8<S>) -> Self::Of8<Twice<S>>;
 
     /// Sums to put lanes into.
     ///
@@ -229,52 +233,82 @@ impl Tile<'_> {
     ) {
         let row = sides(y);
         let planes_row = planes.rows(frame, y);
-        for group in 0..self.columns.len().div_ceil(GROUP) {
-            let x = self.columns.start + group * GROUP;
-            let lanes = (self.columns.end - x).min(GROUP);
-            let all = u32::MAX >> (u32::BITS as usize - lanes);
-            // SAFETY: as the caller's; a row of sides is readable up to a whole group.
+        let viewpoint = self.options.viewpoint;
+        let mut x = self.columns.start;
+        while x < self.columns.end {
+            // SAFETY: as the caller's; a row of sides is readable up to a whole pair of groups.
             unsafe {
-                let group_sides = S::load(row.as_ptr().add(x));
-                let windows = S::bits(S::lt(S::splat(0.0), group_sides)) & all;
-                if windows == 0 {
-                    sink.write_none(x, y, lanes);
+                let pair = [Group::<S>::new(self, row, x, y), Group::new(self, row, x + GROUP, y)];
+                x += 2 * GROUP;
+                let windows = pair[0].windows | pair[1].windows << GROUP;
+                if windows == 0 || hidden {
+                    for group in &pair {
+                        self.without_sums(sink, group);
+                    }
                     continue;
                 }
-                if hidden {
-                    let mut normals = Octet::none();
-                    self.plain_lanes(&mut normals, &row[x..x + lanes], (x, y), windows);
-                    sink.write(x, y, lanes, &normals, true);
-                    continue;
+                let first = self.group::<S, M>(frame, planes, sums, sides, &pair[0]);
+                let second = self.group::<S, M>(frame, planes, sums, sides, &pair[1]);
+                let group_sides = [pair[0].sides, pair[1].sides];
+                let of16 = M::pair::<S>(first.0, second.0);
+                let found = sums.estimate::<Twice<S>>(frame, &of16, group_sides, windows);
+                let plain = first.1 | second.1 << GROUP | found.doubtful & windows;
+                for g in 0..2 {
+                    let group = &pair[g];
+                    let plain = plain >> (g * GROUP) & 0xff;
+                    if group.windows == 0 {
+                        sink.write_none(group.x, y, group.count);
+                        continue;
+                    }
+                    let column = frame.column(group.x);
+                    let point = [
+                        Floats(S::load(planes_row[0].as_ptr().add(column))),
+                        Floats(S::load(planes_row[1].as_ptr().add(column))),
+                        Floats(S::load(planes_row[2].as_ptr().add(column))),
+                    ];
+                    let normal = [
+                        Floats(found.normal[0].0[g]),
+                        Floats(found.normal[1].0[g]),
+                        Floats(found.normal[2].0[g]),
+                    ];
+                    let curvature = Floats(found.curvature.0[g]);
+                    let sure = group.windows & !plain;
+                    let mut normals = Octet::of::<S>(normal, curvature, point, viewpoint, sure);
+                    if plain != 0 {
+                        self.plain_lanes(&mut normals, group, plain);
+                    }
+                    sink.write(group.x, y, group.count, &normals, M::CURVATURE);
                 }
-                let group = Group::<S> { x, y, row, sides: group_sides, windows };
-                let (of8, plain) = self.group::<S, M>(frame, planes, sums, sides, &group);
-                let found = sums.estimate::<S>(frame, &of8, group_sides, windows);
-                let plain = plain | found.doubtful & windows;
-                let column = frame.column(x);
-                let point = [
-                    Floats(S::load(planes_row[0].as_ptr().add(column))),
-                    Floats(S::load(planes_row[1].as_ptr().add(column))),
-                    Floats(S::load(planes_row[2].as_ptr().add(column))),
-                ];
-                let mut normals =
-                    Octet::of::<S>(&found, point, self.options.viewpoint, windows & !plain);
-                if plain != 0 {
-                    self.plain_lanes(&mut normals, &row[x..x + lanes], (x, y), plain);
-                }
-                sink.write(x, y, lanes, &normals, M::CURVATURE);
             }
         }
     }
 
-    /// The normals of some of the lanes from `(x, y)` on, by the plain form.
+    /// A group that needs no sums: without windows, or whose windows are all left to the plain form.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn without_sums<S: Simd>(&self, sink: &Sink, group: &Group<S>) {
+        // SAFETY: as the caller's.
+        unsafe {
+            if group.windows == 0 {
+                sink.write_none(group.x, group.y, group.count);
+                return;
+            }
+            let mut normals = Octet::none();
+            self.plain_lanes(&mut normals, group, group.windows);
+            sink.write(group.x, group.y, group.count, &normals, true);
+        }
+    }
+
+    /// The normals of some of a group's lanes by the plain form.
     #[cold]
-    fn plain_lanes(&self, normals: &mut Octet, sides: &[f32], (x, y): (usize, usize), lanes: u32) {
+    fn plain_lanes<S: Simd>(&self, normals: &mut Octet, group: &Group<S>, lanes: u32) {
         for lane in Bits(lanes) {
-            let pixel = (x + lane, y);
-            let side = sides[lane] as usize;
+            let pixel = (group.x + lane, group.y);
+            let side = group.row[pixel.0] as usize;
             let found = estimate(self.options.method, self.points, self.image, pixel, side);
-            let point = self.points.at(x + lane, y);
+            let point = self.points.at(pixel.0, pixel.1);
             let normal = turn_to_viewpoint(found.normal, point, self.options.viewpoint);
             normals.put(lane, Estimate { normal, ..found });
         }
@@ -296,6 +330,9 @@ impl Tile<'_> {
         let (mut plain, mut todo) = (0, group.windows);
         // SAFETY: as the caller's; the frame holds the largest side around every pixel of the tile.
         unsafe {
+            if todo == 0 {
+                return (M::none::<S>(), 0);
+            }
             let (same, side) = group.next_windows(todo);
             todo &= !same;
             let mut of8 = if self.is_inside(group, same, side) {
@@ -396,11 +433,26 @@ struct Group<'a, S: Simd> {
     /// The row's sides of windows, and the eight pixels'.
     row: &'a [f32],
     sides: S::F,
+    /// Its pixels in the tile; none for the half of a pair that lies behind the tile.
+    count: usize,
     /// The lanes that have a window.
     windows: u32,
 }
 
-impl<S: Simd> Group<'_, S> {
+impl<'a, S: Simd> Group<'a, S> {
+    /// # Safety
+    /// The processor has the instruction set of `S`; the row is readable from `x` up to a whole group.
+    #[inline(always)]
+    unsafe fn new(tile: &Tile, row: &'a [f32], x: usize, y: usize) -> Self {
+        let count = tile.columns.end.saturating_sub(x).min(GROUP);
+        // SAFETY: as the caller's.
+        unsafe {
+            let sides = S::load(row.as_ptr().add(x));
+            let windows = S::bits(S::lt(S::splat(0.0), sides)) & ((1 << count) - 1);
+            Group { x, y, row, sides, count, windows }
+        }
+    }
+
     /// The first of the lanes `todo` and those with windows of the same side; and that side.
     ///
     /// # Safety
@@ -457,7 +509,8 @@ impl Octet {
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn of<S: Simd>(
-        found: &Found<S>,
+        normal: [Floats<S>; 3],
+        curvature: Floats<S>,
         point: [Floats<S>; 3],
         viewpoint: [f32; 3],
         lanes: u32,
@@ -468,17 +521,17 @@ impl Octet {
             let viewpoint = [Floats::<S>::splat(x), Floats::splat(y), Floats::splat(z)];
             let [x, y, z] = point;
             let to_viewpoint = [viewpoint[0] - x, viewpoint[1] - y, viewpoint[2] - z];
-            let cosine = dot(to_viewpoint, found.normal);
+            let cosine = dot(to_viewpoint, normal);
             let flip = S::and(S::lt(cosine.0, S::splat(0.0)), S::splat(-0.0));
             let mask = S::mask(lanes);
             let none = S::splat(f32::NAN);
             let mut octet = std::mem::MaybeUninit::<Octet>::uninit();
             let to = octet.as_mut_ptr().cast::<f32>();
             for c in 0..3 {
-                let normal = S::select(mask, S::xor(found.normal[c].0, flip), none);
+                let normal = S::select(mask, S::xor(normal[c].0, flip), none);
                 S::store(to.add(c * GROUP), normal);
             }
-            S::store(to.add(3 * GROUP), S::select(mask, found.curvature.0, none));
+            S::store(to.add(3 * GROUP), S::select(mask, curvature.0, none));
             octet.assume_init()
         }
     }

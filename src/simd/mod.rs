@@ -4,6 +4,7 @@
 //! path is compiled for its instruction set. No operation fuses or reorders, so every path gives the same bits.
 
 pub(crate) mod portable;
+pub(crate) mod twice;
 
 #[cfg(target_arch = "aarch64")]
 pub(crate) mod neon;
@@ -75,7 +76,6 @@ pub(crate) trait Simd: Copy {
     unsafe fn sub_d(a: Self::D, b: Self::D) -> Self::D;
     unsafe fn mul_d(a: Self::D, b: Self::D) -> Self::D;
     unsafe fn div_d(a: Self::D, b: Self::D) -> Self::D;
-    unsafe fn sqrt_d(a: Self::D) -> Self::D;
     unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D;
     /// `a < b ? yes : no`
     unsafe fn select_lt_d(a: Self::D, b: Self::D, yes: Self::D, no: Self::D) -> Self::D;
