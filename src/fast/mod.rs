@@ -208,7 +208,7 @@ impl Job<'_> {
     /// How far a window, or a depth change that decides one, can be from its pixel, where no depth is above `deepest`.
     fn reach(&self, deepest: f32) -> usize {
         let smoothing = depth_smoothing(deepest, self.options);
-        (smoothing as usize + 2).min(self.image.width + self.image.height)
+        (smoothing as usize).saturating_add(2).min(self.image.width + self.image.height)
     }
 
     /// The largest finite magnitude of the depths.
