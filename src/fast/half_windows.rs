@@ -219,6 +219,7 @@ impl Sums for HalfWindows {
         _frame: &Frame,
         tangents: &Self::Of8<S>,
         sides: S::F,
+        _lanes: u32,
     ) -> Found<S> {
         let [h, v] = *tangents;
         // SAFETY: as the caller's.

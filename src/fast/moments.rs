@@ -218,6 +218,7 @@ impl Sums for Moments {
         _frame: &Frame,
         moments: &Self::Of8<S>,
         _sides: S::F,
+        lanes: u32,
     ) -> Found<S> {
         // SAFETY: as the caller's.
         unsafe {
@@ -246,12 +247,12 @@ impl Sums for Moments {
             };
             let (two, three) = (one + one, one + one + one);
             let (zero, converged) = (Doubles::splat(0.0), Doubles::splat(CONVERGED));
-            let (mut slope, mut unsettled) = (zero, !0);
+            let (mut slope, mut unsettled) = (zero, lanes);
             for _ in 0..STEPS {
                 slope = (three * value - two) * value + c1;
                 let step = (((value - one) * value + c1) * value - c0) / slope;
                 value = value - step;
-                unsettled = !step.max(zero - step).lt(converged * slope) & 0xff;
+                unsettled = !step.max(zero - step).lt(converged * slope) & lanes;
                 if unsettled == 0 {
                     break;
                 }

@@ -217,6 +217,7 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
         _frame: &Frame,
         sums: &Self::Of8<S>,
         sides: S::F,
+        _lanes: u32,
     ) -> Found<S> {
         // SAFETY: as the caller's.
         unsafe {

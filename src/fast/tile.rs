@@ -86,12 +86,18 @@ pub(crate) trait Sums {
     /// As [`Sums::push`].
     unsafe fn put<S: Simd>(sums: &mut Self::Of8<S>, lane: usize, one: Self::Of1);
 
-    /// The estimates from the sums; `sides` are the sides of the windows.
+    /// The estimates from the sums; `sides` are the sides of the windows. Only these `lanes` have sums: the others
+    /// hold anything, and may not have a say in these lanes' estimates.
     ///
     /// # Safety
     /// As [`Sums::push`].
-    unsafe fn estimate<S: Simd>(&self, frame: &Frame, sums: &Self::Of8<S>, sides: S::F)
-    -> Found<S>;
+    unsafe fn estimate<S: Simd>(
+        &self,
+        frame: &Frame,
+        sums: &Self::Of8<S>,
+        sides: S::F,
+        lanes: u32,
+    ) -> Found<S>;
 }
 
 /// What a tile is computed from.
@@ -245,7 +251,7 @@ impl Tile<'_> {
                         group_sides,
                         windows,
                     );
-                    let found = sums.estimate::<S>(frame, &of8, group_sides);
+                    let found = sums.estimate::<S>(frame, &of8, group_sides, windows & !plain);
                     let plain = plain | found.doubtful & windows;
                     let column = frame.column(x);
                     let point = [
