@@ -58,8 +58,8 @@ fn reference(
             let mut order = [0, 1, 2];
             order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
             let [smallest, middle, largest] = order.map(|i| eigen.eigenvalues[i]);
-            // Doubles cannot tell the direction of a line's normal.
-            if middle < DEFINED * smallest || middle < 1e-9 * largest {
+            // Doubles cannot tell the direction of a line's normal; a single place has none.
+            if middle < DEFINED * smallest || middle <= 1e-9 * largest {
                 return None;
             }
             let normal = eigen.eigenvectors.column(order[0]).into_owned();

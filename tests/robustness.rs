@@ -111,7 +111,10 @@ fn nothing_panics() {
                 }
             }
             let length = a[..3].iter().map(|c| c * c).sum::<f32>();
-            if (length - 1.0).abs() > 1e-4 {
+            // AVERAGE_DEPTH_CHANGE's smallest windows are computed in floats, as in PCL, and overflow as in PCL.
+            let as_plain = options.method == Method::AverageDepthChange
+                && a.map(f32::to_bits) == b.map(f32::to_bits);
+            if (length - 1.0).abs() > 1e-4 && !as_plain {
                 println!("seed {seed} length {length} {isa:?} {a:?} plain {b:?} {options:?}");
                 differing += 1;
             }
