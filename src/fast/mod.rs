@@ -52,6 +52,7 @@ pub(crate) struct Scratch {
     rows: Vec<Lanes>,
     each: Vec<Mutex<WorkerScratch>>,
     listed: Vec<(u32, u32)>,
+    chunks: Vec<Chunk>,
 }
 
 /// What one worker needs.
@@ -72,6 +73,7 @@ impl Scratch {
         let each = self.each.iter().map(|scratch| lock(scratch).size()).sum::<usize>();
         self.rows.capacity() * size_of::<Lanes>()
             + self.listed.capacity() * size_of::<(u32, u32)>()
+            + self.chunks.capacity() * size_of::<Chunk>()
             + each
     }
 }
@@ -120,7 +122,7 @@ pub(crate) fn compute(
 ) -> Result<(), Error> {
     scratch.workers.prepare(options.threads)?;
     let (width, height) = (points.width(), points.height());
-    let Scratch { workers, rows, each, listed } = scratch;
+    let Scratch { workers, rows, each, listed, chunks } = scratch;
     let count = workers.count();
     each.resize_with(count.max(each.len()), Mutex::default);
 
@@ -130,11 +132,11 @@ pub(crate) fn compute(
 
     // One sweep over all rows needs no bound on its reach.
     let reach = if count > 1 { job.reach(job.deepest(workers)) } else { height };
-    let chunks = chunks(height, count, reach);
+    share_out(height, count, reach, chunks);
     let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
     let length = row_length(width);
     reserve(rows, swept * length)?;
-    let limit = job.sweep(workers, each, &chunks, &mut rows[..swept * length]);
+    let limit = job.sweep(workers, each, chunks, &mut rows[..swept * length]);
 
     let reach = job.reach(limit);
     let rows = &rows[..swept * length];
@@ -172,19 +174,18 @@ fn reserve(rows: &mut Vec<Lanes>, length: usize) -> Result<(), Error> {
 
 /// The rows shared out to `count` sweeps. A depth change more than `reach` away decides no window, so each sweep can
 /// start and end that far around its own rows.
-fn chunks(height: usize, count: usize, reach: usize) -> Vec<Chunk> {
+fn share_out(height: usize, count: usize, reach: usize, chunks: &mut Vec<Chunk>) {
     let per_chunk = height.div_ceil(count);
     let per_chunk = if per_chunk < 2 * reach { height } else { per_chunk };
     let mut start = 0;
     let first_rows = (0..height).step_by(per_chunk);
-    first_rows
-        .map(|first| {
-            let own = first..(first + per_chunk).min(height);
-            let swept = own.start.saturating_sub(reach)..(own.end + reach).min(height);
-            start += swept.len();
-            Chunk { own, start: start - swept.len(), swept }
-        })
-        .collect()
+    chunks.clear();
+    chunks.extend(first_rows.map(|first| {
+        let own = first..(first + per_chunk).min(height);
+        let swept = own.start.saturating_sub(reach)..(own.end + reach).min(height);
+        start += swept.len();
+        Chunk { own, start: start - swept.len(), swept }
+    }));
 }
 
 /// Lends every item of a slice to one worker at a time.
@@ -207,7 +208,7 @@ impl Job<'_> {
     /// How far a window, or a depth change that decides one, can be from its pixel, where no depth is above `deepest`.
     fn reach(&self, deepest: f32) -> usize {
         let smoothing = depth_smoothing(deepest, self.options);
-        (smoothing as usize + 2).min(self.image.width + self.image.height)
+        (smoothing as usize).saturating_add(2).min(self.image.width + self.image.height)
     }
 
     /// The largest finite magnitude of the depths.

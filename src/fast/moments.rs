@@ -255,7 +255,7 @@ impl Sums for Moments {
             };
             let (two, three) = (one + one, one + one + one);
             let (zero, converged) = (Doubles::splat(0.0), Doubles::splat(CONVERGED));
-            let (mut slope, mut unsettled) = (zero, !0);
+            let (mut slope, mut unsettled) = (zero, lanes);
             for _ in 0..STEPS {
                 slope = (three * value - two) * value + c1;
                 let step = (((value - one) * value + c1) * value - c0) / slope;
@@ -282,7 +282,10 @@ impl Sums for Moments {
             }
             let scale = Floats::splat(1.0) / dot(n, n).sqrt();
             let least = Doubles::splat(DOUBT_SUMS * self.error);
-            let sure = Doubles::splat(DOUBT_PLANE).lt(slope) & least.lt(slope * trace);
+            // Where the points lie on a line, the steps may end at the largest eigenvalue instead.
+            let is_smallest = value.lt(Doubles::splat(1.0 / 3.0));
+            let sure =
+                Doubles::splat(DOUBT_PLANE).lt(slope) & least.lt(slope * trace) & is_smallest;
             Found {
                 normal: [n[0] * scale, n[1] * scale, n[2] * scale],
                 curvature: value.narrow(),

@@ -93,7 +93,8 @@ pub(crate) trait Sums {
     /// As [`Sums::push`].
     unsafe fn put<S: Simd>(sums: &mut Self::Of8<S>, lane: usize, one: Self::Of1);
 
-    /// The estimates from the sums; `sides` are the sides of the windows, of which only `lanes` count.
+    /// The estimates from the sums; `sides` are the sides of the windows. Only these `lanes` have sums: the others
+    /// hold anything, and may not have a say in these lanes' estimates.
     ///
     /// # Safety
     /// As [`Sums::push`].
@@ -251,8 +252,9 @@ impl Tile<'_> {
                 let second = self.group::<S, M>(frame, planes, sums, sides, &pair[1]);
                 let group_sides = [pair[0].sides, pair[1].sides];
                 let of16 = M::pair::<S>(first.0, second.0);
-                let found = sums.estimate::<Twice<S>>(frame, &of16, group_sides, windows);
-                let plain = first.1 | second.1 << GROUP | found.doubtful & windows;
+                let left = first.1 | second.1 << GROUP;
+                let found = sums.estimate::<Twice<S>>(frame, &of16, group_sides, windows & !left);
+                let plain = left | found.doubtful & windows;
                 for g in 0..2 {
                     let group = &pair[g];
                     let plain = plain >> (g * GROUP) & 0xff;
