@@ -296,6 +296,8 @@ impl<'a> Points<'a> {
         let first = self.grid.offset(columns.start, y);
         let step = self.grid.point_stride;
         let mut done = 0;
+        #[cfg(not(target_arch = "x86_64"))]
+        let _ = whole_points;
         #[cfg(target_arch = "x86_64")]
         if whole_points {
             use std::arch::x86_64::*;
