@@ -4,7 +4,9 @@ use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::depth_change::depth_change_map;
 use crate::distance::distance_map;
-use crate::methods::{Estimate, estimate};
+use crate::fast::{self, SMALLEST_IMAGE, Scratch};
+use crate::isa::Isa;
+use crate::methods::{Estimate, estimate, estimate_window};
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
 use crate::smoothing_area::window_side;
@@ -25,12 +27,30 @@ pub struct Maps<'a> {
 #[derive(Debug)]
 pub struct Estimator {
     options: Options,
+    isa: Isa,
+    scratch: Scratch,
 }
 
 impl Estimator {
     /// An estimator with these options.
     pub fn new(options: Options) -> Self {
-        Estimator { options }
+        Self::with_isa(options, Isa::active())
+    }
+
+    /// An estimator that computes with this instruction set, or with the active one if the processor lacks it.
+    pub fn with_isa(options: Options, isa: Isa) -> Self {
+        let isa = if isa.is_available() { isa } else { Isa::active() };
+        Estimator { options, isa, scratch: Scratch::default() }
+    }
+
+    /// The instruction set that computes.
+    pub fn isa(&self) -> Isa {
+        self.isa
+    }
+
+    /// Whether the plain form computes: because it was asked for, or the image is tiny.
+    fn is_plain(&self, points: &Points) -> bool {
+        self.isa == Isa::Scalar || points.width().min(points.height()) < SMALLEST_IMAGE
     }
 
     /// The options.
@@ -60,6 +80,16 @@ impl Estimator {
                 unsafe { normals.write(x, y, estimate.normal, estimate.curvature) };
             }
             return Ok(());
+        }
+        if !self.is_plain(points) {
+            return fast::compute(
+                self.isa,
+                points,
+                &self.options,
+                None,
+                normals,
+                &mut self.scratch,
+            );
         }
         let plain = Plain::new(points, &self.options);
         for y in 0..points.height() {
@@ -101,6 +131,10 @@ impl Estimator {
             }
             return Ok(());
         }
+        if !self.is_plain(points) {
+            let (options, scratch) = (&self.options, &mut self.scratch);
+            return fast::compute(self.isa, points, options, Some(indices), normals, scratch);
+        }
         let plain = Plain::new(points, &self.options);
         for (k, &index) in indices.iter().enumerate() {
             let (x, y) = (index as usize % points.width(), index as usize / points.width());
@@ -108,6 +142,37 @@ impl Estimator {
             // SAFETY: `normals` has an element for every index, and no other thread is at work.
             unsafe { normals.write(k, 0, normal, curvature) };
         }
+        Ok(())
+    }
+
+    /// Computes the normal of pixel `(x, y)` from the window of `width` x `height` pixels around it, whatever the
+    /// depth changes, the smoothing size and the ignored border say; writes it to `normal`, which must be 1 x 1.
+    ///
+    /// The window starts at `(x - width / 2, y - height / 2)`; what lies outside the image is clipped, or folded
+    /// back with [`BorderPolicy::Mirror`](crate::BorderPolicy::Mirror). NaN if it gives no normal.
+    /// Errors: as [`Estimator::compute`], and [`Error::Index`] if the pixel is outside the cloud.
+    pub fn compute_window(
+        &mut self,
+        points: &Points,
+        (x, y): (usize, usize),
+        (width, height): (u32, u32),
+        normal: &mut Normals,
+    ) -> Result<(), Error> {
+        self.options.check()?;
+        if (normal.width(), normal.height()) != (1, 1) {
+            return Err(Error::Size);
+        }
+        if x >= points.width() || y >= points.height() {
+            return Err(Error::Index);
+        }
+        normal.check_disjoint(points)?;
+        let border_policy = self.options.border_policy;
+        let image = Image { width: points.width(), height: points.height(), border_policy };
+        let size = (width as usize, height as usize);
+        let found = estimate_window(self.options.method, points, &image, (x, y), size);
+        let towards = turn_to_viewpoint(found.normal, points.at(x, y), self.options.viewpoint);
+        // SAFETY: `normal` has this one element, and no other thread is at work.
+        unsafe { normal.write(0, 0, towards, found.curvature) };
         Ok(())
     }
 
@@ -154,11 +219,13 @@ impl Estimator {
 
     /// How much scratch memory is held, in bytes.
     pub fn scratch_size(&self) -> usize {
-        0
+        self.scratch.size()
     }
 
     /// Frees the scratch memory and the worker threads; the next computation makes them anew.
-    pub fn release_scratch(&mut self) {}
+    pub fn release_scratch(&mut self) {
+        self.scratch = Scratch::default();
+    }
 }
 
 /// The plain form of the whole method: the specification that every fast path is held to.

@@ -30,12 +30,15 @@ mod distance;
 mod eigen;
 mod error;
 mod estimator;
+mod fast;
 mod isa;
 mod methods;
 mod options;
 mod orientation;
 mod paper;
+mod simd;
 mod smoothing_area;
+mod threads;
 mod window;
 
 pub use cloud::{Normals, Points};

@@ -3,10 +3,10 @@
 use crate::options::Options;
 
 /// The least value of the smoothing area that gives a window; PCL asks for more than this.
-const SMALLEST: f32 = 2.0;
+pub(crate) const SMALLEST: f32 = 2.0;
 
-/// The largest side a window can have; larger than any image.
-const LARGEST: f32 = i32::MAX as f32;
+/// The largest side a window can have: every whole number up to it is a float.
+pub(crate) const LARGEST: f32 = 16_777_216.0;
 
 /// How far a pixel at depth `z` may be smoothed: the paper's B (Eq. 5), as PCL defines it.
 #[inline(always)]
@@ -21,6 +21,6 @@ pub(crate) fn depth_smoothing(z: f32, options: &Options) -> f32 {
 /// The side of the window of a pixel at `z`, `distance` from the nearest depth change; 0 for no window.
 #[inline(always)]
 pub(crate) fn window_side(distance: f32, z: f32, options: &Options) -> u32 {
-    let smoothing = distance.min(depth_smoothing(z, options));
-    if smoothing > SMALLEST && z.is_finite() { smoothing.min(LARGEST) as u32 } else { 0 }
+    let smallest = distance.min(depth_smoothing(z, options));
+    if smallest > SMALLEST && z.is_finite() { smallest.min(LARGEST) as u32 } else { 0 }
 }

@@ -9,6 +9,8 @@ use crate::options::BorderPolicy;
 pub(crate) struct Rect {
     pub x: Range<usize>,
     pub y: Range<usize>,
+    /// 1, or -1 where mirroring takes the pixels away: only for windows that start outside the image.
+    pub sign: i32,
 }
 
 impl Rect {
@@ -21,7 +23,7 @@ impl Rect {
         let clip = |range: &Range<usize>, size: usize| {
             range.start.max(1)..range.end.min(size.saturating_sub(1))
         };
-        Rect { x: clip(&self.x, image.width), y: clip(&self.y, image.height) }
+        Rect { x: clip(&self.x, image.width), y: clip(&self.y, image.height), sign: self.sign }
     }
 }
 
@@ -34,7 +36,8 @@ pub(crate) struct Image {
 }
 
 impl Image {
-    /// The rectangles that make up a window which may cross the border; a pixel in two of them counts twice.
+    /// The rectangles that make up a window which may cross the border; a pixel in two of them counts twice, and
+    /// one in a rectangle of negative sign is taken away.
     ///
     /// With [`BorderPolicy::Ignore`] the window is clipped (PCL reads out of bounds there).
     pub fn rects(
@@ -44,8 +47,12 @@ impl Image {
     ) -> impl Iterator<Item = Rect> + use<> {
         let columns = fold(start.0, size.0, self.width, self.border_policy);
         let rows = fold(start.1, size.1, self.height, self.border_policy);
-        rows.into_iter()
-            .flat_map(move |y| columns.clone().into_iter().map(move |x| Rect { x, y: y.clone() }))
+        rows.into_iter().flat_map(move |y| {
+            columns.clone().into_iter().map(move |x| {
+                let ((x, sign_x), (y, sign_y)) = (in_order(x), in_order(y.clone()));
+                Rect { x, y, sign: sign_x * sign_y }
+            })
+        })
     }
 
     /// A pixel that may lie outside the image, brought back inside: mirrored as PCL does, or clamped.
@@ -57,9 +64,16 @@ impl Image {
     }
 }
 
+/// An interval with its ends in order, and the sign of its length.
+fn in_order(range: Range<usize>) -> (Range<usize>, i32) {
+    if range.start > range.end { (range.end..range.start, -1) } else { (range, 1) }
+}
+
 /// The one or two intervals of `0..limit` that `start..start + size` becomes; the second may be empty.
 ///
-/// Mirrored as PCL's `sumArea`: about index 0 at the near border, and without the last index at the far one.
+/// Mirrored as PCL's `sumArea`: about index 0 at the near border, and without the last index at the far one. A
+/// window that starts behind the last index (a right or lower half of AVERAGE_DEPTH_CHANGE) gives a first interval
+/// whose ends are in reverse order: as in a difference of integral image values, its pixels count negatively.
 /// What would still leave the image (a window larger than the image, where PCL reads out of bounds) is clipped.
 fn fold(start: isize, size: usize, limit: usize, policy: BorderPolicy) -> [Range<usize>; 2] {
     let end = start + size as isize;
@@ -97,6 +111,16 @@ mod tests {
         assert_eq!(fold(4, 5), [4..9, 0..0]);
         assert_eq!(fold(5, 5), [5..9, 9..9]);
         assert_eq!(fold(7, 5), [7..9, 7..9]);
+    }
+
+    #[test]
+    fn a_window_that_starts_behind_the_image_takes_its_last_column_away() {
+        let image = Image { width: 10, height: 6, border_policy: BorderPolicy::Mirror };
+        let rects: Vec<Rect> = image.rects((10, 1), (3, 2)).filter(|r| !r.y.is_empty()).collect();
+        assert_eq!(
+            rects,
+            [Rect { x: 9..10, y: 1..3, sign: -1 }, Rect { x: 6..9, y: 1..3, sign: 1 }]
+        );
     }
 
     #[test]

@@ -250,6 +250,8 @@ typedef struct iine_maps {
 
 
 
+
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -382,14 +384,39 @@ int32_t iine_estimator_compute_indices(struct iine_estimator *estimator,
                                        const struct iine_normals *normals);
 
 /**
+ * Computes the normal of pixel (`x`, `y`) from the window of `rect_width` x `rect_height` pixels around it,
+ * whatever the depth changes, the smoothing size and the ignored border say, into the first element of `normal`
+ * (as PCL's `computePointNormal` after `setRectSize`).
+ *
+ * The window starts at (x - rect_width / 2, y - rect_height / 2). What lies outside the image is left out with
+ * IINE_BORDER_POLICY_IGNORE and folded back with IINE_BORDER_POLICY_MIRROR. Where the window gives no normal, and
+ * a size of 0 never does, NaN is written. Takes time proportional to the window's area.
+ *
+ * Errors: as `iine_estimator_compute`, IINE_ERROR_INDEX if the pixel is outside the cloud, and
+ * IINE_ERROR_OPTION_VALUE if a size is negative. Nothing is written then.
+ *
+ * # Safety
+ * As `iine_estimator_compute`.
+ */
+int32_t iine_estimator_compute_window(struct iine_estimator *estimator,
+                                      const struct iine_points *points,
+                                      uint32_t x,
+                                      uint32_t y,
+                                      int32_t rect_width,
+                                      int32_t rect_height,
+                                      const struct iine_normals *normal);
+
+/**
  * Computes the maps behind the normals: those whose pointers in `maps` are not NULL.
  *
+ * A map must overlap neither another map nor the range of bytes from a coordinate's first pixel to its last.
+ *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_STRUCT_SIZE, IINE_ERROR_SIZE, IINE_ERROR_STRIDE,
- * IINE_ERROR_MISALIGNED, IINE_ERROR_OUT_OF_MEMORY. Nothing is written then.
+ * IINE_ERROR_MISALIGNED, IINE_ERROR_OVERLAP, IINE_ERROR_OUT_OF_MEMORY. Nothing is written then.
  *
  * # Safety
  * The pointers are NULL or valid as their structs say, for the whole call; each map is valid for width * height
- * writes and overlaps neither the points nor another map; no other thread uses `estimator` meanwhile.
+ * writes; no other thread uses `estimator` meanwhile.
  */
 int32_t iine_estimator_compute_maps(struct iine_estimator *estimator,
                                     const struct iine_points *points,

@@ -300,14 +300,52 @@ pub unsafe extern "C" fn iine_estimator_compute_indices(
     })
 }
 
+/// Computes the normal of pixel (`x`, `y`) from the window of `rect_width` x `rect_height` pixels around it,
+/// whatever the depth changes, the smoothing size and the ignored border say, into the first element of `normal`
+/// (as PCL's `computePointNormal` after `setRectSize`).
+///
+/// The window starts at (x - rect_width / 2, y - rect_height / 2). What lies outside the image is left out with
+/// IINE_BORDER_POLICY_IGNORE and folded back with IINE_BORDER_POLICY_MIRROR. Where the window gives no normal, and
+/// a size of 0 never does, NaN is written. Takes time proportional to the window's area.
+///
+/// Errors: as `iine_estimator_compute`, IINE_ERROR_INDEX if the pixel is outside the cloud, and
+/// IINE_ERROR_OPTION_VALUE if a size is negative. Nothing is written then.
+///
+/// # Safety
+/// As `iine_estimator_compute`.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_compute_window(
+    estimator: *mut iine_estimator,
+    points: *const iine_points,
+    x: u32,
+    y: u32,
+    rect_width: i32,
+    rect_height: i32,
+    normal: *const iine_normals,
+) -> i32 {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let estimator = &mut unsafe { reference_mut(estimator) }?.estimator;
+        // SAFETY: promised by the caller.
+        let points = unsafe { read_points(points) }?;
+        // SAFETY: promised by the caller.
+        let mut normal = unsafe { read_normals(normal, 1, 1, true) }?;
+        let size = |size| u32::try_from(size).map_err(|_| Error::OptionValue);
+        let size = (size(rect_width)?, size(rect_height)?);
+        estimator.compute_window(&points, (x as usize, y as usize), size, &mut normal)
+    })
+}
+
 /// Computes the maps behind the normals: those whose pointers in `maps` are not NULL.
 ///
+/// A map must overlap neither another map nor the range of bytes from a coordinate's first pixel to its last.
+///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_STRUCT_SIZE, IINE_ERROR_SIZE, IINE_ERROR_STRIDE,
-/// IINE_ERROR_MISALIGNED, IINE_ERROR_OUT_OF_MEMORY. Nothing is written then.
+/// IINE_ERROR_MISALIGNED, IINE_ERROR_OVERLAP, IINE_ERROR_OUT_OF_MEMORY. Nothing is written then.
 ///
 /// # Safety
 /// The pointers are NULL or valid as their structs say, for the whole call; each map is valid for width * height
-/// writes and overlaps neither the points nor another map; no other thread uses `estimator` meanwhile.
+/// writes; no other thread uses `estimator` meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn iine_estimator_compute_maps(
     estimator: *mut iine_estimator,
@@ -322,7 +360,8 @@ pub unsafe extern "C" fn iine_estimator_compute_maps(
         // SAFETY: promised by the caller.
         let maps = unsafe { read_sized(maps, &[size_of::<iine_maps>()]) }?;
         let pixels = points.width() * points.height();
-        // SAFETY: promised by the caller.
+        check_maps_disjoint(&maps, pixels, &points)?;
+        // SAFETY: promised by the caller; they overlap nothing.
         let mut maps = unsafe {
             Maps {
                 depth_changes: optional_slice(maps.depth_changes, pixels)?,
@@ -332,6 +371,26 @@ pub unsafe extern "C" fn iine_estimator_compute_maps(
         };
         estimator.compute_maps(&points, &mut maps)
     })
+}
+
+/// Refuses maps of `pixels` elements that overlap each other or reach into the points' fields.
+fn check_maps_disjoint(maps: &iine_maps, pixels: usize, points: &Points) -> Result<(), Error> {
+    let float_bytes = pixels * size_of::<f32>();
+    let maps = [
+        (maps.depth_changes.addr(), pixels),
+        (maps.distances.addr(), float_bytes),
+        (maps.smoothing_areas.addr(), float_bytes),
+    ];
+    let mut seen: Vec<(usize, usize)> = Vec::new();
+    for (start, bytes) in maps.into_iter().filter(|(start, _)| *start != 0) {
+        let end = start.checked_add(bytes).ok_or(Error::Size)?;
+        let overlaps_map = seen.iter().any(|&(from, to)| start < to && from < end);
+        if overlaps_map || points.reach_into(start, end) {
+            return Err(Error::Overlap);
+        }
+        seen.push((start, end));
+    }
+    Ok(())
 }
 
 /// # Safety

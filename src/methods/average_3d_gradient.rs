@@ -12,11 +12,11 @@ pub(crate) fn estimate(
     points: &Points,
     image: &Image,
     (x, y): (usize, usize),
-    side: usize,
+    (width, height): (usize, usize),
 ) -> Estimate {
     let mut horizontal = Gradient::default();
     let mut vertical = Gradient::default();
-    for rect in image.rects((start(x, side), start(y, side)), (side, side)) {
+    for rect in image.rects((start(x, width), start(y, height)), (width, height)) {
         let inside = rect.inside_frame(image);
         let frame = rect.pixels().count() - inside.pixels().count();
         horizontal.count += frame;

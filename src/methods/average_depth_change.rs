@@ -8,34 +8,37 @@ use crate::window::Image;
 /// The plain form.
 ///
 /// As PCL, the upper point is read one column to the left and the lower one one column to the right of the
-/// pixel, `side / 4` rows away, where one row further was meant. No normal if a half window has no finite z.
+/// pixel, a quarter of the window's height away, where one row further was meant. No normal if a half window has
+/// no finite z.
 pub(crate) fn estimate(
     points: &Points,
     image: &Image,
     (x, y): (usize, usize),
-    side: usize,
+    (width, height): (usize, usize),
 ) -> Estimate {
-    let (half, quarter) = (side / 2, (side / 4) as isize);
-    let (left, top) = (start(x, side), start(y, side));
+    let half = (width / 2, height / 2);
+    let (quarter_x, quarter_y) = ((width / 4) as isize, (height / 4) as isize);
+    let (left, top) = (start(x, width), start(y, height));
     let (x, y) = (x as isize, y as isize);
     let mean_z = |start| {
-        let (mut sum, mut count) = (0.0, 0);
-        for rect in image.rects(start, (half, half)) {
+        let (mut sum, mut count) = (0.0, 0_i32);
+        for rect in image.rects(start, half) {
             for (x, y) in rect.pixels() {
                 let z = points.z(x, y);
                 if z.is_finite() {
-                    sum += f64::from(z);
-                    count += 1;
+                    sum += f64::from(rect.sign) * f64::from(z);
+                    count += rect.sign;
                 }
             }
         }
-        (count > 0).then(|| sum / f64::from(count))
+        // Counts are unsigned in PCL: one below zero is a very large one.
+        (count != 0).then(|| sum / f64::from(count as u32))
     };
     let means = [
-        mean_z((left, y - quarter)),
-        mean_z((x + 1, y - quarter)),
-        mean_z((x - quarter, top)),
-        mean_z((x - quarter, y + 1)),
+        mean_z((left, y - quarter_y)),
+        mean_z((x + 1, y - quarter_y)),
+        mean_z((x - quarter_x, top)),
+        mean_z((x - quarter_x, y + 1)),
     ];
     let [Some(left_z), Some(right_z), Some(up_z), Some(down_z)] = means else {
         return Estimate::NONE;
@@ -44,11 +47,32 @@ pub(crate) fn estimate(
         let (x, y) = image.pixel(x, y);
         points.at(x, y).map(f64::from)
     };
-    let left = single((x - quarter - 1, y));
-    let right = single((x + quarter + 1, y));
-    let up = single((x - 1, y - quarter));
-    let down = single((x + 1, y + quarter));
+    let left = single((x - quarter_x - 1, y));
+    let right = single((x + quarter_x + 1, y));
+    let up = single((x - 1, y - quarter_y));
+    let down = single((x + 1, y + quarter_y));
     let horizontal = [right[0] - left[0], right[1] - left[1], right_z - left_z];
     let vertical = [down[0] - up[0], down[1] - up[1], down_z - up_z];
-    normal_of_tangents(vertical, horizontal)
+    // In PCL's order, which differs from the other methods': it decides the sign where the surface is seen
+    // exactly edge-on and the viewpoint does not.
+    if half == (1, 1) {
+        single_precision_normal(horizontal.map(|c| c as f32), vertical.map(|c| c as f32))
+    } else {
+        normal_of_tangents(horizontal, vertical)
+    }
+}
+
+/// The normal of the smallest windows, rounded as PCL rounds it.
+///
+/// With half windows of one pixel both tangents have the same x and y, and all that is left of the cross product is
+/// the difference of two nearly equal products. Its direction is that of f32's rounding in up to one normal of a
+/// thousand, which is kept, as the half windows' depths are in f32 exactly what PCL has.
+fn single_precision_normal(a: [f32; 3], b: [f32; 3]) -> Estimate {
+    let n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let squared_length = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+    if squared_length == 0.0 {
+        return Estimate::NONE;
+    }
+    let scale = 1.0 / squared_length.sqrt();
+    Estimate { normal: n.map(|c| c * scale), curvature: f32::NAN }
 }

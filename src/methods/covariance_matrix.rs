@@ -13,31 +13,34 @@ pub(crate) fn estimate(
     points: &Points,
     image: &Image,
     (x, y): (usize, usize),
-    side: usize,
+    (width, height): (usize, usize),
 ) -> Estimate {
-    let window = (start(x, side), start(y, side));
-    let finite = || {
-        image
-            .rects(window, (side, side))
-            .flat_map(|rect| rect.pixels().map(|(x, y)| points.at(x, y)).collect::<Vec<_>>())
-            .filter(|point| is_finite(*point))
-            .map(|point| point.map(f64::from))
+    let window = (start(x, width), start(y, height));
+    let for_each_finite = |f: &mut dyn FnMut([f64; 3])| {
+        for rect in image.rects(window, (width, height)) {
+            for (x, y) in rect.pixels() {
+                let point = points.at(x, y);
+                if is_finite(point) {
+                    f(point.map(f64::from));
+                }
+            }
+        }
     };
     let (mut mean, mut count) = ([0.0; 3], 0.0);
-    for point in finite() {
+    for_each_finite(&mut |point| {
         for i in 0..3 {
             mean[i] += point[i];
         }
         count += 1.0;
-    }
+    });
     if count == 0.0 {
         return Estimate::NONE;
     }
     mean = mean.map(|sum| sum / count);
     let mut covariance = Symmetric3::default();
-    for point in finite() {
+    for_each_finite(&mut |point| {
         covariance.add_outer([point[0] - mean[0], point[1] - mean[1], point[2] - mean[2]]);
-    }
+    });
     from_covariance(&covariance)
 }
 

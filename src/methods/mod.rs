@@ -33,11 +33,22 @@ pub(crate) fn estimate(
     pixel: (usize, usize),
     side: usize,
 ) -> Estimate {
+    estimate_window(method, points, image, pixel, (side, side))
+}
+
+/// The estimate of pixel `(x, y)` from a window of any `size` (width, height), by walking over the window.
+pub(crate) fn estimate_window(
+    method: Method,
+    points: &Points,
+    image: &Image,
+    pixel: (usize, usize),
+    size: (usize, usize),
+) -> Estimate {
     match method {
-        Method::CovarianceMatrix => covariance_matrix::estimate(points, image, pixel, side),
-        Method::Average3DGradient => average_3d_gradient::estimate(points, image, pixel, side),
-        Method::AverageDepthChange => average_depth_change::estimate(points, image, pixel, side),
-        Method::Simple3DGradient => simple_3d_gradient::estimate(points, image, pixel, side),
+        Method::CovarianceMatrix => covariance_matrix::estimate(points, image, pixel, size),
+        Method::Average3DGradient => average_3d_gradient::estimate(points, image, pixel, size),
+        Method::AverageDepthChange => average_depth_change::estimate(points, image, pixel, size),
+        Method::Simple3DGradient => simple_3d_gradient::estimate(points, image, pixel, size),
     }
 }
 
@@ -59,8 +70,8 @@ pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 
 /// The unit vector along the cross product of two tangents; none if they are parallel.
 #[inline(always)]
-pub(crate) fn normal_of_tangents(vertical: [f64; 3], horizontal: [f64; 3]) -> Estimate {
-    let n = cross(vertical, horizontal);
+pub(crate) fn normal_of_tangents(first: [f64; 3], second: [f64; 3]) -> Estimate {
+    let n = cross(first, second);
     let squared_length = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
     if squared_length == 0.0 {
         return Estimate::NONE;

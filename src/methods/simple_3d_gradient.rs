@@ -7,16 +7,15 @@ use crate::window::Image;
 /// The plain form: right strip minus left strip, lower strip minus upper strip.
 ///
 /// As PCL, points with a non-finite coordinate are missing from their strips, and the right and lower strips lie
-/// `side / 2` from the pixel (for even sides just outside the window).
+/// half a side from the pixel (for even sides just outside the window).
 pub(crate) fn estimate(
     points: &Points,
     image: &Image,
     (x, y): (usize, usize),
-    side: usize,
+    (width, height): (usize, usize),
 ) -> Estimate {
-    let half = (side / 2) as isize;
-    let (left, top) = (start(x, side), start(y, side));
-    let (right, bottom) = (x as isize + half, y as isize + half);
+    let (left, top) = (start(x, width), start(y, height));
+    let (right, bottom) = (x as isize + (width / 2) as isize, y as isize + (height / 2) as isize);
     let strip = |start, size| {
         let mut sum = [0.0; 3];
         for rect in image.rects(start, size) {
@@ -32,7 +31,7 @@ pub(crate) fn estimate(
         sum
     };
     let difference = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    let horizontal = difference(strip((right, top), (1, side)), strip((left, top), (1, side)));
-    let vertical = difference(strip((left, bottom), (side, 1)), strip((left, top), (side, 1)));
+    let horizontal = difference(strip((right, top), (1, height)), strip((left, top), (1, height)));
+    let vertical = difference(strip((left, bottom), (width, 1)), strip((left, top), (width, 1)));
     normal_of_tangents(vertical, horizontal)
 }

@@ -1,9 +1,9 @@
 //! The organized cloud with its depths; every way of being missing has become NaN.
 
+use super::rect::Rect;
 use crate::cloud::Points;
 use crate::methods::is_finite;
 use crate::options::{Depth, Options, Semantics};
-use crate::window::Rect;
 
 /// An organized cloud, row by row. A missing point has NaN coordinates and NaN depth.
 pub(crate) struct Cloud {

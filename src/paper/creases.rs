@@ -7,9 +7,9 @@
 use super::cloud::Cloud;
 use super::depth_change::SummedChanges;
 use super::one_sided::{smaller, windows};
+use super::rect::Rect;
 use super::summed_area::SummedArea;
 use crate::methods::Estimate;
-use crate::window::Rect;
 
 /// Sums of the first pass' normals.
 pub(crate) struct SummedNormals {

@@ -9,8 +9,8 @@
 //! the end of the gap.
 
 use super::cloud::Cloud;
+use super::rect::Rect;
 use super::summed_area::SummedArea;
-use crate::window::Rect;
 
 /// Where there are depth changes, row by row.
 pub(crate) struct DepthChanges {

@@ -1,10 +1,10 @@
 //! Step 4: a normal from the points in a rectangle. Plain forms, walking over it; sums over finite points only.
 
 use super::cloud::Cloud;
+use super::rect::Rect;
 use crate::eigen::{Symmetric3, eigen};
 use crate::methods::{Estimate, normal_of_tangents};
 use crate::options::Method;
-use crate::window::Rect;
 
 /// The estimate of a method of the paper.
 pub(crate) fn estimate(method: Method, cloud: &Cloud, rect: &Rect) -> Estimate {

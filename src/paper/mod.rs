@@ -10,18 +10,20 @@ mod depth_change;
 mod distance;
 mod methods;
 mod one_sided;
+mod rect;
 mod smoothing_area;
 mod summed_area;
 
 use cloud::Cloud;
 use depth_change::DepthChanges;
+use rect::Rect;
 use summed_area::SummedArea;
 
 use crate::cloud::Points;
 use crate::methods::{self as pcl, Estimate};
 use crate::options::{BorderPolicy, Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
-use crate::window::{Image, Rect};
+use crate::window::Image;
 
 /// A pixel's window, and the side it would have far from any depth change.
 #[derive(Clone)]

@@ -7,9 +7,9 @@
 use super::cloud::Cloud;
 use super::depth_change::SummedChanges;
 use super::methods::plane_of;
+use super::rect::Rect;
 use super::summed_area::SummedArea;
 use crate::methods::Estimate;
-use crate::window::Rect;
 
 /// Where in its window a pixel stands: in the middle, at the middle of an edge, in a corner.
 const PLACES: [(i8, i8); 9] =

@@ -2,7 +2,7 @@
 
 use std::ops::{Add, Sub};
 
-use crate::window::Rect;
+use super::rect::Rect;
 
 /// Sums over every rectangle from the image's first pixel, with a row and a column of zeros before it.
 pub(crate) struct SummedArea<T, const N: usize> {

@@ -1,0 +1,604 @@
+// What callers of PCL's class rely on, and what iine's class adds.
+
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <memory>
+#include <thread>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include <pcl/point_types.h>
+
+#include <iine/pcl/integral_image_normal.h>
+
+namespace
+{
+  using Cloud = pcl::PointCloud<pcl::PointXYZ>;
+  using Normals = pcl::PointCloud<pcl::Normal>;
+  using Estimator = iine::IntegralImageNormalEstimation<pcl::PointXYZ, pcl::Normal>;
+  constexpr float NaN = std::numeric_limits<float>::quiet_NaN ();
+
+  /** \brief A tilted, slightly uneven surface with a missing block. */
+  template <typename PointT = pcl::PointXYZ> typename pcl::PointCloud<PointT>::Ptr
+  scene (int width = 60, int height = 44, float tilt = 0.3f)
+  {
+    typename pcl::PointCloud<PointT>::Ptr cloud (new pcl::PointCloud<PointT> (width, height));
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+      {
+        const float u = static_cast<float> (x - width / 2) / 60.0f, v = static_cast<float> (y - height / 2) / 60.0f;
+        const float z = 1.5f + tilt * u + 0.05f * std::sin (12.0f * v);
+        auto &point = (*cloud) (x, y);
+        point.x = u * z;
+        point.y = v * z;
+        point.z = x > 40 && x < 44 && y > 20 && y < 24 ? NaN : z;
+      }
+    return cloud;
+  }
+
+  template <typename PointT> bool
+  areSame (const PointT &a, const PointT &b)
+  {
+    const auto same = [] (float u, float v) { return u == v || (std::isnan (u) && std::isnan (v)); };
+    return same (a.normal_x, b.normal_x) && same (a.normal_y, b.normal_y) && same (a.normal_z, b.normal_z)
+        && same (a.curvature, b.curvature);
+  }
+
+  ::testing::AssertionResult
+  areEqual (const Normals &a, const Normals &b)
+  {
+    if (a.size () != b.size () || a.width != b.width || a.height != b.height)
+      return ::testing::AssertionFailure () << "sizes differ";
+    for (std::size_t i = 0; i < a.size (); ++i)
+      if (!areSame (a[i], b[i]))
+        return ::testing::AssertionFailure () << "normals differ at " << i;
+    return ::testing::AssertionSuccess ();
+  }
+
+  std::size_t
+  countNormals (const Normals &normals)
+  {
+    std::size_t count = 0;
+    for (const auto &normal : normals)
+      count += std::isfinite (normal.normal_x);
+    return count;
+  }
+
+  Normals
+  compute (Estimator &estimator)
+  {
+    Normals normals;
+    estimator.compute (normals);
+    return normals;
+  }
+
+  Normals
+  computeFresh (const Cloud::ConstPtr &cloud, Estimator::NormalEstimationMethod method, float size = 10.0f)
+  {
+    Estimator estimator;
+    estimator.setNormalEstimationMethod (method);
+    estimator.setNormalSmoothingSize (size);
+    estimator.setInputCloud (cloud);
+    return compute (estimator);
+  }
+
+  /** \brief A search tree that says whether anyone gave it a cloud. */
+  class WatchedTree : public pcl::search::Search<pcl::PointXYZ>
+  {
+    public:
+      bool is_used = false;
+
+      void
+      setInputCloud (const PointCloudConstPtr &, const IndicesConstPtr &) override
+      {
+        is_used = true;
+      }
+
+      int
+      nearestKSearch (const pcl::PointXYZ &, int, pcl::Indices &, std::vector<float> &) const override
+      {
+        return 0;
+      }
+
+      int
+      radiusSearch (const pcl::PointXYZ &, double, pcl::Indices &, std::vector<float> &, unsigned) const override
+      {
+        return 0;
+      }
+  };
+}
+
+TEST (Interface, HasPclsMembersWithPclsSignatures)
+{
+  EXPECT_EQ (Estimator::BORDER_POLICY_IGNORE, 0);
+  EXPECT_EQ (Estimator::BORDER_POLICY_MIRROR, 1);
+  EXPECT_EQ (Estimator::COVARIANCE_MATRIX, 0);
+  EXPECT_EQ (Estimator::AVERAGE_3D_GRADIENT, 1);
+  EXPECT_EQ (Estimator::AVERAGE_DEPTH_CHANGE, 2);
+  EXPECT_EQ (Estimator::SIMPLE_3D_GRADIENT, 3);
+  // As bindings take them.
+  void (Estimator::*set_rect_size) (int, int) = &Estimator::setRectSize;
+  void (Estimator::*set_border_policy) (Estimator::BorderPolicy) = &Estimator::setBorderPolicy;
+  void (Estimator::*point) (int, int, unsigned, pcl::Normal &) = &Estimator::computePointNormal;
+  void (Estimator::*mirrored) (int, int, unsigned, pcl::Normal &) = &Estimator::computePointNormalMirror;
+  void (Estimator::*set_factor) (float) = &Estimator::setMaxDepthChangeFactor;
+  void (Estimator::*set_size) (float) = &Estimator::setNormalSmoothingSize;
+  void (Estimator::*set_method) (Estimator::NormalEstimationMethod) = &Estimator::setNormalEstimationMethod;
+  void (Estimator::*set_depth_dependent) (bool) = &Estimator::setDepthDependentSmoothing;
+  void (Estimator::*set_input) (const Cloud::ConstPtr &) = &Estimator::setInputCloud;
+  float *(Estimator::*get_map) () = &Estimator::getDistanceMap;
+  void (Estimator::*set_viewpoint) (float, float, float) = &Estimator::setViewPoint;
+  void (Estimator::*get_viewpoint) (float &, float &, float &) = &Estimator::getViewPoint;
+  void (Estimator::*use_origin) () = &Estimator::useSensorOriginAsViewPoint;
+  EXPECT_TRUE (set_rect_size && set_border_policy && point && mirrored && set_factor && set_size && set_method
+               && set_depth_dependent && set_input && get_map && set_viewpoint && get_viewpoint && use_origin);
+  static_assert (std::is_base_of<pcl::Feature<pcl::PointXYZ, pcl::Normal>, Estimator>::value, "");
+  static_assert (std::is_same<Estimator::PointCloudIn, Cloud>::value, "");
+  static_assert (std::is_same<Estimator::PointCloudOut, Normals>::value, "");
+  static_assert (std::is_copy_constructible<Estimator>::value && std::is_move_assignable<Estimator>::value, "");
+  const Estimator::Ptr shared (new Estimator);
+  const Estimator::ConstPtr constant = shared;
+  EXPECT_EQ (constant->getKSearch (), 1);
+}
+
+TEST (Interface, DefaultsArePcls)
+{
+  Estimator chosen;
+  chosen.setNormalEstimationMethod (Estimator::AVERAGE_3D_GRADIENT);
+  chosen.setBorderPolicy (Estimator::BORDER_POLICY_IGNORE);
+  chosen.setDepthDependentSmoothing (false);
+  chosen.setNormalSmoothingSize (10.0f);
+  chosen.setMaxDepthChangeFactor (20.0f * 0.001f);
+  Estimator plain;
+  chosen.setInputCloud (scene ());
+  plain.setInputCloud (scene ());
+  const Normals normals = compute (plain);
+  EXPECT_TRUE (areEqual (normals, compute (chosen)));
+  EXPECT_GT (countNormals (normals), 100u);
+}
+
+TEST (Interface, WorksThroughAFeaturePointer)
+{
+  const pcl::Feature<pcl::PointXYZ, pcl::Normal>::Ptr feature (new Estimator);
+  feature->setInputCloud (scene ());
+  feature->setKSearch (0);
+  feature->setRadiusSearch (0.03);
+  Normals normals;
+  feature->compute (normals);
+  EXPECT_TRUE (areEqual (normals, computeFresh (scene (), Estimator::AVERAGE_3D_GRADIENT)));
+}
+
+TEST (CallOrders, MethodsAreChangedBetweenComputes)
+{
+  Estimator estimator;
+  estimator.setInputCloud (scene ());
+  for (auto method : {Estimator::SIMPLE_3D_GRADIENT, Estimator::COVARIANCE_MATRIX, Estimator::AVERAGE_DEPTH_CHANGE,
+                      Estimator::AVERAGE_3D_GRADIENT, Estimator::COVARIANCE_MATRIX})
+  {
+    estimator.setNormalEstimationMethod (method);
+    EXPECT_TRUE (areEqual (compute (estimator), computeFresh (scene (), method)));
+  }
+}
+
+TEST (CallOrders, OptionsAfterTheCloud)
+{
+  Estimator estimator;
+  estimator.setInputCloud (scene ());
+  estimator.setNormalSmoothingSize (5.0f);
+  estimator.setNormalEstimationMethod (Estimator::COVARIANCE_MATRIX);
+  EXPECT_TRUE (areEqual (compute (estimator), computeFresh (scene (), Estimator::COVARIANCE_MATRIX, 5.0f)));
+}
+
+TEST (CallOrders, IndicesBeforeAndAfterTheCloud)
+{
+  const pcl::IndicesPtr indices (new pcl::Indices {1000, 1001, 1500, 900});
+  Estimator after, before;
+  after.setInputCloud (scene ());
+  after.setIndices (indices);
+  before.setIndices (indices);
+  before.setInputCloud (scene ());
+  EXPECT_TRUE (areEqual (compute (after), compute (before)));
+}
+
+TEST (CallOrders, ReusedForCloudsOfOtherSizes)
+{
+  Estimator estimator;
+  for (auto method : {Estimator::COVARIANCE_MATRIX, Estimator::AVERAGE_3D_GRADIENT, Estimator::SIMPLE_3D_GRADIENT})
+    for (const auto &size : std::vector<std::pair<int, int> > {{60, 44}, {44, 60}, {20, 8}, {3, 2}, {1, 5}, {100, 70}})
+    {
+      const Cloud::Ptr cloud = scene (size.first, size.second);
+      estimator.setNormalEstimationMethod (method);
+      estimator.setInputCloud (cloud);
+      EXPECT_TRUE (areEqual (compute (estimator), computeFresh (cloud, method))) << size.first;
+      EXPECT_EQ (estimator.getLastStatus (), IINE_OK);
+    }
+}
+
+TEST (CallOrders, TheCloudIsReadAtCompute)
+{
+  const Cloud::Ptr cloud = scene ();
+  Estimator estimator;
+  estimator.setInputCloud (cloud);
+  *cloud = *scene (60, 44, -0.6f);
+  EXPECT_TRUE (areEqual (compute (estimator), computeFresh (scene (60, 44, -0.6f), Estimator::AVERAGE_3D_GRADIENT)));
+}
+
+TEST (Output, SizeHeaderPoseAndDensityAreThoseOfTheCloud)
+{
+  const Cloud::Ptr cloud = scene ();
+  cloud->header.seq = 3;
+  cloud->header.stamp = 5;
+  cloud->header.frame_id = "camera";
+  cloud->sensor_origin_ = Eigen::Vector4f (1.0f, 2.0f, 3.0f, 0.0f);
+  cloud->sensor_orientation_ = Eigen::Quaternionf (0.5f, 0.5f, 0.5f, -0.5f);
+  const Normals normals = computeFresh (cloud, Estimator::AVERAGE_3D_GRADIENT);
+  EXPECT_EQ (normals.width, cloud->width);
+  EXPECT_EQ (normals.height, cloud->height);
+  EXPECT_FALSE (normals.is_dense);
+  EXPECT_EQ (normals.header.seq, 3u);
+  EXPECT_EQ (normals.header.stamp, 5u);
+  EXPECT_EQ (normals.header.frame_id, "camera");
+  EXPECT_EQ (normals.sensor_origin_, cloud->sensor_origin_);
+  EXPECT_TRUE (normals.sensor_orientation_.coeffs () == cloud->sensor_orientation_.coeffs ());
+}
+
+TEST (Output, MayBeTheInputCloudAndOtherFieldsStay)
+{
+  using PointT = pcl::PointXYZRGBNormal;
+  for (bool use_indices : {false, true})
+  {
+    const pcl::PointCloud<PointT>::Ptr cloud = scene<PointT> ();
+    for (std::size_t i = 0; i < cloud->size (); ++i)
+      (*cloud)[i].rgba = static_cast<std::uint32_t> (i * 2654435761u);
+    const pcl::PointCloud<PointT> before = *cloud;
+    iine::IntegralImageNormalEstimation<PointT, PointT> estimator;
+    estimator.setNormalEstimationMethod (decltype (estimator)::COVARIANCE_MATRIX);
+    estimator.setInputCloud (cloud);
+    const std::size_t last = cloud->size () - 1;
+    pcl::IndicesPtr reversed (new pcl::Indices);
+    for (std::size_t i = 0; i <= last; ++i)
+      reversed->push_back (static_cast<int> (last - i));
+    if (use_indices)
+      estimator.setIndices (reversed);
+    estimator.compute (*cloud);
+    ASSERT_EQ (estimator.getLastStatus (), IINE_OK);
+    const Normals expected = computeFresh (scene (), Estimator::COVARIANCE_MATRIX);
+    for (std::size_t i = 0; i <= last; ++i)
+    {
+      EXPECT_EQ (std::memcmp ((*cloud)[i].data, before[i].data, sizeof (before[i].data)), 0);
+      EXPECT_EQ ((*cloud)[i].rgba, before[i].rgba);
+      const pcl::Normal &normal = expected[use_indices ? last - i : i];
+      EXPECT_TRUE ((*cloud)[i].normal_x == normal.normal_x || std::isnan (normal.normal_x));
+      EXPECT_TRUE ((*cloud)[i].curvature == normal.curvature || std::isnan (normal.curvature));
+    }
+  }
+}
+
+TEST (Output, AnInPlaceOutputThatIndicesShrinkIsAnErrorNotACrash)
+{
+  using PointT = pcl::PointXYZRGBNormal;
+  const pcl::PointCloud<PointT>::Ptr cloud = scene<PointT> ();
+  iine::IntegralImageNormalEstimation<PointT, PointT> estimator;
+  estimator.setInputCloud (cloud);
+  estimator.setIndices (pcl::IndicesPtr (new pcl::Indices {5, 1000}));
+  estimator.compute (*cloud);
+  EXPECT_EQ (estimator.getLastStatus (), IINE_ERROR_SIZE);
+  EXPECT_TRUE (std::isnan (cloud->front ().normal_x));
+}
+
+TEST (Output, AllPointTypesGiveTheSame)
+{
+  const Normals expected = computeFresh (scene (), Estimator::COVARIANCE_MATRIX);
+  iine::IntegralImageNormalEstimation<pcl::PointXYZRGBA, pcl::PointNormal> estimator;
+  estimator.setNormalEstimationMethod (decltype (estimator)::COVARIANCE_MATRIX);
+  estimator.setInputCloud (scene<pcl::PointXYZRGBA> ());
+  pcl::PointCloud<pcl::PointNormal> normals;
+  estimator.compute (normals);
+  ASSERT_EQ (normals.size (), expected.size ());
+  for (std::size_t i = 0; i < normals.size (); ++i)
+  {
+    EXPECT_EQ (normals[i].x, 0.0f);
+    EXPECT_TRUE (normals[i].normal_x == expected[i].normal_x || std::isnan (expected[i].normal_x));
+  }
+}
+
+TEST (Indices, OutputKBelongsToIndexK)
+{
+  const Cloud::Ptr cloud = scene ();
+  for (auto method : {Estimator::COVARIANCE_MATRIX, Estimator::AVERAGE_3D_GRADIENT})
+  {
+    const Normals whole = computeFresh (cloud, method);
+    const int size = static_cast<int> (cloud->size ());
+    pcl::IndicesPtr some (new pcl::Indices), permuted (new pcl::Indices), repeated (new pcl::Indices);
+    for (int i = 0; i < size; ++i)
+    {
+      permuted->push_back (static_cast<int> (static_cast<long> (i) * 1009 % size));
+      if (i % 3 == 0)
+        some->push_back (i);
+    }
+    for (int i = 0; i < 2 * size; ++i)
+      repeated->push_back (i * 7 % size);
+    for (const auto &indices : {some, permuted, repeated})
+    {
+      Estimator estimator;
+      estimator.setNormalEstimationMethod (method);
+      estimator.setInputCloud (cloud);
+      estimator.setIndices (indices);
+      const Normals normals = compute (estimator);
+      ASSERT_EQ (normals.size (), indices->size ());
+      EXPECT_EQ (normals.width, indices == permuted ? cloud->width : indices->size ());
+      EXPECT_EQ (normals.height, indices == permuted ? cloud->height : 1u);
+      for (std::size_t k = 0; k < indices->size (); ++k)
+        ASSERT_TRUE (areSame (normals[k], whole[(*indices)[k]])) << k;
+    }
+  }
+}
+
+TEST (Indices, NoneGivesNoneAndOnesOutsideAreAnError)
+{
+  Estimator estimator;
+  estimator.setInputCloud (scene ());
+  estimator.setIndices (pcl::IndicesPtr (new pcl::Indices));
+  EXPECT_EQ (compute (estimator).size (), 0u);
+  EXPECT_EQ (estimator.getLastStatus (), IINE_OK);
+  for (int bad : {-1, 60 * 44})
+  {
+    estimator.setIndices (pcl::IndicesPtr (new pcl::Indices {1000, bad}));
+    const Normals normals = compute (estimator);
+    EXPECT_EQ (estimator.getLastStatus (), IINE_ERROR_INDEX);
+    ASSERT_EQ (normals.size (), 2u);
+    EXPECT_EQ (countNormals (normals), 0u);
+  }
+}
+
+TEST (Errors, NoCloud)
+{
+  Estimator estimator;
+  Normals normals (3, 2);
+  estimator.compute (normals);
+  EXPECT_EQ (normals.size (), 0u);
+  EXPECT_EQ (normals.width, 0u);
+  EXPECT_EQ (normals.height, 0u);
+  EXPECT_EQ (estimator.getLastStatus (), IINE_ERROR_NULL_POINTER);
+  pcl::Normal normal;
+  estimator.computePointNormal (0, 0, 0, normal);
+  EXPECT_TRUE (std::isnan (normal.normal_x));
+  estimator.setInputCloud (Cloud::ConstPtr ());
+  EXPECT_EQ (estimator.getDistanceMap (), nullptr);
+}
+
+TEST (Errors, UnorganizedEmptyAndMisshapenClouds)
+{
+  const Cloud::Ptr unorganized (new Cloud (100, 1)), empty (new Cloud), misshapen = scene ();
+  empty->width = 0;
+  empty->height = 2;
+  misshapen->width += 1;
+  for (const auto &cloud : {unorganized, empty, misshapen})
+  {
+    Estimator estimator;
+    estimator.setInputCloud (cloud);
+    Normals normals (3, 2);
+    estimator.compute (normals);
+    EXPECT_EQ (normals.size (), 0u);
+    EXPECT_EQ (normals.width, 0u);
+    EXPECT_EQ (normals.height, 0u);
+    EXPECT_EQ (estimator.getLastStatus (), IINE_ERROR_SIZE);
+    estimator.setInputCloud (scene ());
+    EXPECT_GT (countNormals (compute (estimator)), 100u);
+    EXPECT_EQ (estimator.getLastStatus (), IINE_OK);
+  }
+}
+
+TEST (Errors, RefusedSmoothingSizesLeaveTheOldOne)
+{
+  Estimator estimator;
+  estimator.setInputCloud (scene ());
+  estimator.setNormalSmoothingSize (5.0f);
+  for (float bad : {0.0f, -3.0f, NaN, std::numeric_limits<float>::infinity ()})
+    estimator.setNormalSmoothingSize (bad);
+  EXPECT_TRUE (areEqual (compute (estimator), computeFresh (scene (), Estimator::AVERAGE_3D_GRADIENT, 5.0f)));
+}
+
+TEST (Errors, UnknownEnumeratorsThrowInSetInputCloud)
+{
+  Estimator estimator;
+  estimator.setNormalEstimationMethod (static_cast<Estimator::NormalEstimationMethod> (4));
+  EXPECT_THROW (estimator.setInputCloud (scene ()), pcl::InitFailedException);
+  EXPECT_EQ (countNormals (compute (estimator)), 0u);
+  EXPECT_EQ (estimator.getLastStatus (), IINE_ERROR_OPTION_VALUE);
+  estimator.setNormalEstimationMethod (Estimator::AVERAGE_3D_GRADIENT);
+  estimator.setBorderPolicy (static_cast<Estimator::BorderPolicy> (2));
+  EXPECT_THROW (estimator.setInputCloud (scene ()), pcl::InitFailedException);
+  EXPECT_EQ (countNormals (compute (estimator)), 0u);
+  estimator.setBorderPolicy (Estimator::BORDER_POLICY_MIRROR);
+  EXPECT_NO_THROW (estimator.setInputCloud (scene ()));
+  EXPECT_GT (countNormals (compute (estimator)), 100u);
+}
+
+TEST (Errors, MirroredSimpleGradientThrows)
+{
+  Estimator estimator;
+  estimator.setNormalEstimationMethod (Estimator::SIMPLE_3D_GRADIENT);
+  estimator.setBorderPolicy (Estimator::BORDER_POLICY_MIRROR);
+  estimator.setInputCloud (scene ());
+  Normals normals;
+  EXPECT_THROW (estimator.compute (normals), pcl::PCLException);
+  EXPECT_EQ (estimator.getLastStatus (), IINE_ERROR_UNSUPPORTED);
+  EXPECT_EQ (estimator.getDistanceMap (), nullptr);
+  pcl::Normal normal;
+  EXPECT_THROW (estimator.computePointNormalMirror (9, 9, 9 * 60 + 9, normal), pcl::PCLException);
+  estimator.setBorderPolicy (Estimator::BORDER_POLICY_IGNORE);
+  EXPECT_TRUE (areEqual (compute (estimator), computeFresh (scene (), Estimator::SIMPLE_3D_GRADIENT)));
+}
+
+TEST (Viewpoint, IsReadWhereTheCloudIsSetOrAskedFor)
+{
+  const Cloud::Ptr cloud = scene ();
+  cloud->sensor_origin_ = Eigen::Vector4f (1.0f, 2.0f, 30.0f, 0.0f);
+  Estimator estimator;
+  float x, y, z;
+  const auto get = [&] () { estimator.getViewPoint (x, y, z); return Eigen::Vector3f (x, y, z); };
+  EXPECT_EQ (get (), Eigen::Vector3f (0, 0, 0));
+  estimator.setInputCloud (cloud);
+  EXPECT_EQ (get (), Eigen::Vector3f (1, 2, 30));
+  const Normals from_behind = compute (estimator);
+  cloud->sensor_origin_ = Eigen::Vector4f::Zero ();
+  EXPECT_EQ (get (), Eigen::Vector3f (1, 2, 30));
+  EXPECT_TRUE (areEqual (compute (estimator), from_behind));
+  estimator.useSensorOriginAsViewPoint ();
+  EXPECT_EQ (get (), Eigen::Vector3f (0, 0, 0));
+  const Normals from_front = compute (estimator);
+  const std::size_t center = 12 * 60 + 30;
+  EXPECT_EQ (from_behind[center].normal_z, -from_front[center].normal_z);
+  estimator.setViewPoint (4, 5, 60);
+  EXPECT_EQ (get (), Eigen::Vector3f (4, 5, 60));
+  estimator.setInputCloud (cloud);
+  EXPECT_EQ (get (), Eigen::Vector3f (4, 5, 60));
+  EXPECT_EQ (compute (estimator)[center].normal_z, from_behind[center].normal_z);
+  Estimator without_cloud;
+  without_cloud.setViewPoint (1, 1, 1);
+  without_cloud.useSensorOriginAsViewPoint ();
+  without_cloud.getViewPoint (x, y, z);
+  EXPECT_EQ (Eigen::Vector3f (x, y, z), Eigen::Vector3f (0, 0, 0));
+}
+
+TEST (DistanceMap, IsThereFromComputeToTheNextCloud)
+{
+  const Cloud::Ptr cloud = scene ();
+  Estimator estimator;
+  EXPECT_EQ (estimator.getDistanceMap (), nullptr);
+  estimator.setInputCloud (cloud);
+  EXPECT_EQ (estimator.getDistanceMap (), nullptr);
+  compute (estimator);
+  const float *const map = estimator.getDistanceMap ();
+  ASSERT_NE (map, nullptr);
+  EXPECT_EQ (map, estimator.getDistanceMap ());
+  EXPECT_EQ (map[22 * 60 + 42], 0.0f);
+  EXPECT_EQ (map[22 * 60 + 50], 6.0f); // the block's last column is 43, its neighbour 44 counts as changed
+  const std::vector<float> first (map, map + cloud->size ());
+  // The factor at compute counts, not one that is set later.
+  compute (estimator);
+  estimator.setMaxDepthChangeFactor (1e-6f);
+  ASSERT_NE (estimator.getDistanceMap (), nullptr);
+  EXPECT_EQ (std::vector<float> (estimator.getDistanceMap (), estimator.getDistanceMap () + cloud->size ()), first);
+  compute (estimator);
+  EXPECT_NE (std::vector<float> (estimator.getDistanceMap (), estimator.getDistanceMap () + cloud->size ()), first);
+  estimator.setInputCloud (cloud);
+  EXPECT_EQ (estimator.getDistanceMap (), nullptr);
+}
+
+TEST (PointNormal, UsesTheRectangleAndComputeDoesNot)
+{
+  for (auto method : {Estimator::COVARIANCE_MATRIX, Estimator::AVERAGE_3D_GRADIENT, Estimator::AVERAGE_DEPTH_CHANGE,
+                      Estimator::SIMPLE_3D_GRADIENT})
+  {
+    Estimator estimator;
+    estimator.setNormalEstimationMethod (method);
+    estimator.setInputCloud (scene ());
+    pcl::Normal normal;
+    estimator.computePointNormal (25, 15, 15 * 60 + 25, normal);
+    EXPECT_TRUE (std::isnan (normal.normal_x)) << "the rectangle is 0 x 0 at first";
+    estimator.setRectSize (10, 10);
+    estimator.computePointNormal (25, 15, 15 * 60 + 25, normal);
+    EXPECT_EQ (estimator.getLastStatus (), IINE_OK);
+    const Normals whole = computeFresh (scene (), method);
+    const float cosine = normal.getNormalVector3fMap ().dot (whole[15 * 60 + 25].getNormalVector3fMap ());
+    EXPECT_NEAR (cosine, 1.0f, 1e-6f); // compute may sum in another order
+    estimator.setRectSize (9, 4);
+    EXPECT_TRUE (areEqual (compute (estimator), whole));
+    pcl::Normal other;
+    estimator.computePointNormal (25, 15, 15 * 60 + 25, other);
+    EXPECT_FALSE (areSame (normal, other)) << "compute has left the rectangle alone";
+    if (method != Estimator::SIMPLE_3D_GRADIENT)
+    {
+      estimator.computePointNormalMirror (0, 0, 0, other);
+      EXPECT_EQ (estimator.getLastStatus (), IINE_OK);
+    }
+    estimator.computePointNormal (-1, 0, 0, other);
+    EXPECT_EQ (estimator.getLastStatus (), IINE_ERROR_INDEX);
+    EXPECT_TRUE (std::isnan (other.normal_x) && std::isnan (other.curvature));
+    estimator.setRectSize (-5, 5);
+    estimator.computePointNormal (25, 15, 15 * 60 + 25, other);
+    EXPECT_EQ (estimator.getLastStatus (), IINE_ERROR_OPTION_VALUE);
+  }
+}
+
+TEST (Copies, AreIndependentAndEqual)
+{
+  Estimator original;
+  original.setNormalEstimationMethod (Estimator::COVARIANCE_MATRIX);
+  original.setNormalSmoothingSize (6.0f);
+  original.setInputCloud (scene ());
+  const Normals expected = compute (original);
+  ASSERT_NE (original.getDistanceMap (), nullptr);
+  Estimator copy (original);
+  EXPECT_NE (copy.getDistanceMap (), original.getDistanceMap ());
+  EXPECT_TRUE (areEqual (compute (copy), expected));
+  copy.setInputCloud (scene (30, 70));
+  EXPECT_EQ (compute (copy).size (), 2100u);
+  EXPECT_TRUE (areEqual (compute (original), expected));
+  copy = original;
+  EXPECT_TRUE (areEqual (compute (copy), expected));
+  Estimator moved (std::move (copy));
+  EXPECT_TRUE (areEqual (compute (moved), expected));
+  copy.setInputCloud (scene ()); // what was moved from can be used further
+  EXPECT_TRUE (areEqual (compute (copy), expected));
+  original = std::move (moved);
+  EXPECT_TRUE (areEqual (compute (original), expected));
+}
+
+TEST (Copies, WorkInThreadsAtTheSameTime)
+{
+  Estimator original;
+  original.setInputCloud (scene ());
+  const Normals expected = compute (original);
+  std::vector<Estimator> estimators (4, original);
+  std::vector<Normals> results (estimators.size ());
+  std::vector<std::thread> threads;
+  for (std::size_t i = 0; i < estimators.size (); ++i)
+    threads.emplace_back ([&, i] () { estimators[i].compute (results[i]); });
+  for (auto &thread : threads)
+    thread.join ();
+  for (const Normals &result : results)
+    EXPECT_TRUE (areEqual (result, expected));
+}
+
+TEST (Threads, DoNotChangeTheResult)
+{
+  for (auto method : {Estimator::COVARIANCE_MATRIX, Estimator::AVERAGE_3D_GRADIENT, Estimator::AVERAGE_DEPTH_CHANGE})
+  {
+    const Normals expected = computeFresh (scene (), method);
+    for (unsigned threads : {0u, 1u, 2u, 3u, 7u})
+    {
+      Estimator estimator;
+      estimator.setNormalEstimationMethod (method);
+      estimator.setNumberOfThreads (threads);
+      estimator.setInputCloud (scene ());
+      EXPECT_TRUE (areEqual (compute (estimator), expected)) << threads;
+    }
+  }
+  Estimator estimator;
+  estimator.setNumberOfThreads (5000);
+  estimator.setInputCloud (scene ());
+  EXPECT_EQ (countNormals (compute (estimator)), 0u);
+  EXPECT_EQ (estimator.getLastStatus (), IINE_ERROR_OPTION_VALUE);
+}
+
+TEST (SearchTree, IsNeitherBuiltNorUsed)
+{
+  Estimator estimator;
+  estimator.setInputCloud (scene ());
+  compute (estimator);
+  EXPECT_EQ (estimator.getSearchMethod (), nullptr);
+  EXPECT_EQ (estimator.getSearchSurface (), nullptr);
+  EXPECT_EQ (estimator.getSearchParameter (), 1.0);
+  const std::shared_ptr<WatchedTree> tree (new WatchedTree);
+  estimator.setSearchMethod (tree);
+  EXPECT_GT (countNormals (compute (estimator)), 100u);
+  EXPECT_FALSE (tree->is_used);
+  EXPECT_EQ (estimator.getSearchMethod (), tree);
+}

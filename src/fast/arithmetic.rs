@@ -1,0 +1,120 @@
+//! Operators for groups of eight, so that formulas read as formulas.
+//!
+//! Values exist only where the processor has the instruction set of `S`: they are made from groups of `S`, in functions
+//! whose callers promise it.
+
+use std::ops::{Add, Div, Mul, Sub};
+
+use crate::simd::Simd;
+
+/// Eight f32.
+pub(crate) struct Floats<S: Simd>(pub S::F);
+
+/// Eight f64.
+pub(crate) struct Doubles<S: Simd>(pub S::D);
+
+macro_rules! operators {
+    ($type:ident, $($trait:ident, $method:ident, $function:ident;)*) => {
+        impl<S: Simd> Clone for $type<S> {
+            #[inline(always)]
+            fn clone(&self) -> Self {
+                *self
+            }
+        }
+        impl<S: Simd> Copy for $type<S> {}
+        $(impl<S: Simd> $trait for $type<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                // SAFETY: there is a group, so there is the instruction set.
+                $type(unsafe { S::$function(self.0, other.0) })
+            }
+        })*
+    };
+}
+
+operators!(Floats, Add, add, add; Sub, sub, sub; Mul, mul, mul; Div, div, div;);
+operators!(Doubles, Add, add, add_d; Sub, sub, sub_d; Mul, mul, mul_d; Div, div, div_d;);
+
+impl<S: Simd> Floats<S> {
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn splat(value: f32) -> Self {
+        // SAFETY: as the caller's.
+        Floats(unsafe { S::splat(value) })
+    }
+
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        // SAFETY: there is a group, so there is the instruction set.
+        Floats(unsafe { S::max(self.0, other.0) })
+    }
+
+    #[inline(always)]
+    pub fn sqrt(self) -> Self {
+        // SAFETY: there is a group, so there is the instruction set.
+        Floats(unsafe { S::sqrt(self.0) })
+    }
+
+    /// Bit l is `self < other` in lane l.
+    #[inline(always)]
+    pub fn lt(self, other: Self) -> u32 {
+        // SAFETY: there is a group, so there is the instruction set.
+        unsafe { S::bits(S::lt(self.0, other.0)) }
+    }
+}
+
+impl<S: Simd> Doubles<S> {
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn splat(value: f64) -> Self {
+        // SAFETY: as the caller's.
+        Doubles(unsafe { S::splat_d(value) })
+    }
+
+    #[inline(always)]
+    pub fn max(self, other: Self) -> Self {
+        // SAFETY: there is a group, so there is the instruction set.
+        Doubles(unsafe { S::max_d(self.0, other.0) })
+    }
+
+    /// Bit l is `self < other` in lane l.
+    #[inline(always)]
+    pub fn lt(self, other: Self) -> u32 {
+        // SAFETY: there is a group, so there is the instruction set.
+        unsafe { S::bits_lt_d(self.0, other.0) }
+    }
+
+    /// `self < other ? yes : no`
+    #[inline(always)]
+    pub fn select_lt(self, other: Self, yes: Self, no: Self) -> Self {
+        // SAFETY: there is a group, so there is the instruction set.
+        Doubles(unsafe { S::select_lt_d(self.0, other.0, yes.0, no.0) })
+    }
+
+    #[inline(always)]
+    pub fn narrow(self) -> Floats<S> {
+        // SAFETY: there is a group, so there is the instruction set.
+        Floats(unsafe { S::narrow(self.0) })
+    }
+}
+
+impl<S: Simd> Floats<S> {
+    #[inline(always)]
+    pub fn widen(self) -> Doubles<S> {
+        // SAFETY: there is a group, so there is the instruction set.
+        Doubles(unsafe { S::widen(self.0) })
+    }
+}
+
+#[inline(always)]
+pub(crate) fn cross<S: Simd>(a: [Floats<S>; 3], b: [Floats<S>; 3]) -> [Floats<S>; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[inline(always)]
+pub(crate) fn dot<S: Simd>(a: [Floats<S>; 3], b: [Floats<S>; 3]) -> Floats<S> {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

@@ -1,0 +1,252 @@
+//! Sums of half windows of z, for AVERAGE_DEPTH_CHANGE: the paper's one integral image, in f64.
+
+use super::arithmetic::{Doubles, Floats, cross, dot};
+use super::planes::{Frame, MARGIN, Planes, grow};
+use super::tile::{Found, Sums};
+use crate::simd::twice::Twice;
+use crate::simd::{GROUP, Simd};
+use crate::window::Image;
+
+/// The ring of integral rows of z.
+#[derive(Debug, Default)]
+pub(crate) struct HalfWindows {
+    integrals: Vec<f64>,
+    last: Option<usize>,
+}
+
+/// Horizontal and vertical tangent.
+type Tangents<T> = [[T; 3]; 2];
+
+/// A normal is doubtful where floats could turn it by more than 1e-4: (sine of the angle between the tangents) < 1e-3.
+const DOUBT_SINE: f32 = 1e-6;
+
+impl HalfWindows {
+    /// The sum of z over the rows after the first up to the second, and `count` columns from `start` on.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`; the ring holds the rows, and columns with the one before.
+    #[inline(always)]
+    unsafe fn rows_between<S: Simd>(
+        &self,
+        frame: &Frame,
+        rows: [usize; 2],
+        start: usize,
+        count: usize,
+    ) -> Doubles<S> {
+        // SAFETY: as the caller's.
+        unsafe {
+            let upper =
+                self.integrals.as_ptr().add(frame.place(rows[0]) * frame.stride + start - 1);
+            let lower =
+                self.integrals.as_ptr().add(frame.place(rows[1]) * frame.stride + start - 1);
+            (Doubles(S::load_d(lower.add(count))) - Doubles(S::load_d(lower)))
+                - (Doubles(S::load_d(upper.add(count))) - Doubles(S::load_d(upper)))
+        }
+    }
+}
+
+/// # Safety
+/// The processor has the instruction set of `S`; the planes hold row `y` and the group at index `at`.
+#[inline(always)]
+unsafe fn point<S: Simd>(
+    frame: &Frame,
+    planes: &Planes,
+    c: usize,
+    y: usize,
+    at: usize,
+) -> Floats<S> {
+    // SAFETY: as the caller's.
+    Floats(unsafe { S::load(planes.row(frame, c, y).as_ptr().add(at)) })
+}
+
+impl Sums for HalfWindows {
+    type Of8<S: Simd> = Tangents<Floats<S>>;
+    type Of1 = Tangents<f32>;
+
+    const COLUMN: usize = size_of::<f64>();
+    const CURVATURE: bool = false;
+
+    fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, _origin: [f32; 3]) {
+        grow(&mut self.integrals, frame.ring * frame.stride);
+        self.last = None;
+    }
+
+    fn size(&self) -> usize {
+        self.integrals.capacity() * size_of::<f64>()
+    }
+
+    #[inline(always)]
+    unsafe fn push<S: Simd>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
+        let place = frame.place(y);
+        let groups = frame.groups() + 1;
+        assert!(MARGIN + groups * GROUP <= frame.stride);
+        assert!((place + 1) * frame.stride <= self.integrals.len());
+        let z = planes.row(frame, 2, y).as_ptr();
+        let integrals = self.integrals.as_mut_ptr();
+        // SAFETY: as the caller's; the groups lie inside the row of the ring, as was just checked.
+        unsafe {
+            let row = integrals.add(place * frame.stride);
+            *row.add(MARGIN - 1) = 0.0;
+            let mut carry = S::splat_d(0.0);
+            for group in 0..groups {
+                let at = MARGIN + group * GROUP;
+                let along = S::add_d(S::prefix_sum_d(S::widen(S::load(z.add(at)))), carry);
+                carry = S::last_d(along);
+                let sum = match self.last {
+                    Some(last) => {
+                        S::add_d(along, S::load_d(integrals.add(last * frame.stride + at)))
+                    }
+                    None => along,
+                };
+                S::store_d(row.add(at), sum);
+            }
+        }
+        self.last = Some(place);
+    }
+
+    #[inline(always)]
+    unsafe fn of_group<S: Simd>(
+        &self,
+        frame: &Frame,
+        planes: &Planes,
+        x: usize,
+        y: usize,
+        side: usize,
+    ) -> Self::Of8<S> {
+        let (half, quarter) = (side / 2, side / 4);
+        let x = frame.column(x);
+        // SAFETY: as the caller's: rows and columns are held, and so are the groups from these columns on.
+        unsafe {
+            let (top, bottom) = (y - quarter - 1, y - quarter + half - 1);
+            let left = self.rows_between::<S>(frame, [top, bottom], x - half, half);
+            let right = self.rows_between::<S>(frame, [top, bottom], x + 1, half);
+            let up = self.rows_between::<S>(frame, [y - half - 1, y - 1], x - quarter, half);
+            let down = self.rows_between::<S>(frame, [y, y + half], x - quarter, half);
+            let share = Doubles::splat(1.0 / (half * half) as f64);
+            let (across, along) = ((right - left) * share, (down - up) * share);
+
+            let (next, before) = (x + quarter + 1, x - quarter - 1);
+            let (above, below) = (y - quarter, y + quarter);
+            let mut tangents = [[across.narrow(); 3], [along.narrow(); 3]];
+            for c in 0..2 {
+                tangents[0][c] =
+                    point::<S>(frame, planes, c, y, next) - point(frame, planes, c, y, before);
+                tangents[1][c] = point::<S>(frame, planes, c, below, x + 1)
+                    - point(frame, planes, c, above, x - 1);
+            }
+            tangents
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn select<S: Simd>(lanes: u32, yes: Self::Of8<S>, no: Self::Of8<S>) -> Self::Of8<S> {
+        let mut tangents = no;
+        for g in 0..2 {
+            for c in 0..3 {
+                // SAFETY: as the caller's.
+                let lane = unsafe { S::select(S::mask(lanes), yes[g][c].0, no[g][c].0) };
+                tangents[g][c] = Floats(lane);
+            }
+        }
+        tangents
+    }
+
+    #[inline(always)]
+    fn pair<S: Simd>(first: Self::Of8<S>, second: Self::Of8<S>) -> Self::Of8<Twice<S>> {
+        let both = |a: Floats<S>, b: Floats<S>| Floats([a.0, b.0]);
+        let [[a, b, c], [d, e, f]] = first;
+        let [[g, h, i], [j, k, l]] = second;
+        [[both(a, g), both(b, h), both(c, i)], [both(d, j), both(e, k), both(f, l)]]
+    }
+
+    #[inline(always)]
+    unsafe fn none<S: Simd>() -> Self::Of8<S> {
+        // SAFETY: as the caller's.
+        [[unsafe { Floats::splat(0.0) }; 3]; 2]
+    }
+
+    fn of_mirrored(
+        &self,
+        frame: &Frame,
+        planes: &Planes,
+        image: &Image,
+        (x, y): (usize, usize),
+        side: usize,
+    ) -> Option<Self::Of1> {
+        let (half, quarter) = (side / 2, (side / 4) as isize);
+        let (x, y) = (x as isize, y as isize);
+        let mean = |start: (isize, isize)| {
+            let (mut sum, mut count) = (0.0, 0_i32);
+            for rect in image.rects(start, (half, half)) {
+                if rect.x.is_empty() || rect.y.is_empty() {
+                    continue;
+                }
+                let segment = |end_row: usize| {
+                    if end_row == 0 {
+                        return 0.0;
+                    }
+                    let row = frame.place(end_row - 1) * frame.stride;
+                    self.integrals[row + frame.column(rect.x.end) - 1]
+                        - self.integrals[row + frame.column(rect.x.start) - 1]
+                };
+                sum += f64::from(rect.sign) * (segment(rect.y.end) - segment(rect.y.start));
+                count += rect.sign * (rect.x.len() * rect.y.len()) as i32;
+            }
+            (count > 0).then(|| sum / f64::from(count))
+        };
+        let left = mean((x - half as isize, y - quarter))?;
+        let right = mean((x + 1, y - quarter))?;
+        let up = mean((x - quarter, y - half as isize))?;
+        let down = mean((x - quarter, y + 1))?;
+        let point = |x, y| {
+            let (x, y) = image.pixel(x, y);
+            [0, 1].map(|c| planes.row(frame, c, y)[frame.column(x)])
+        };
+        let difference = |a: [f32; 2], b: [f32; 2], z| [a[0] - b[0], a[1] - b[1], z];
+        let horizontal = [point(x + quarter + 1, y), point(x - quarter - 1, y)];
+        let vertical = [point(x + 1, y + quarter), point(x - 1, y - quarter)];
+        Some([
+            difference(horizontal[0], horizontal[1], (right - left) as f32),
+            difference(vertical[0], vertical[1], (down - up) as f32),
+        ])
+    }
+
+    #[inline(always)]
+    unsafe fn put<S: Simd>(tangents: &mut Self::Of8<S>, lane: usize, one: Self::Of1) {
+        for g in 0..2 {
+            for c in 0..3 {
+                // SAFETY: as the caller's.
+                let with =
+                    unsafe { S::select(S::mask(1 << lane), S::splat(one[g][c]), tangents[g][c].0) };
+                tangents[g][c] = Floats(with);
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn estimate<S: Simd>(
+        &self,
+        _frame: &Frame,
+        tangents: &Self::Of8<S>,
+        sides: S::F,
+        _lanes: u32,
+    ) -> Found<S> {
+        let [h, v] = *tangents;
+        // SAFETY: as the caller's.
+        unsafe {
+            let n = cross(h, v);
+            let n2 = dot(n, n);
+            let sine = dot(h, h) * dot(v, v) * Floats::splat(DOUBT_SINE);
+            // Below this, squares of floats lose digits.
+            let least = Floats::splat(f32::MIN_POSITIVE / f32::EPSILON);
+            // In windows of 3 both tangents join the same two points: floats decide the direction, as in PCL.
+            let smallest = Floats::<S>(sides).lt(Floats::splat(4.0));
+            let scale = Floats::splat(1.0) / n2.sqrt();
+            Found {
+                normal: [n[0] * scale, n[1] * scale, n[2] * scale],
+                curvature: Floats::splat(f32::NAN),
+                doubtful: !(sine.max(least).lt(n2) | smallest & least.lt(n2)),
+            }
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! Sixteen pixels side by side, and rows of them in *lane order*.
+//!
+//! A row of `width` pixels is cut into 16 segments of equal length; element k of the row in lane order holds pixel
+//! k of every segment. So the serial chain along a row that a distance transform needs runs in 16 lanes at once,
+//! and the pixel's neighbours in the rows above and below lie at elements k - 1, k, k + 1.
+
+use crate::simd::{GROUP, Simd};
+
+pub(crate) const LANES: usize = 2 * GROUP;
+
+/// One float of each of sixteen pixels.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Lanes(pub [f32; LANES]);
+
+impl Lanes {
+    pub const ZERO: Lanes = Lanes([0.0; LANES]);
+
+    /// Every lane takes the value of the one before, the first takes `first`.
+    #[inline(always)]
+    pub fn next_lane(&self, first: f32) -> Lanes {
+        let mut lanes = Lanes([first; LANES]);
+        lanes.0[1..].copy_from_slice(&self.0[..LANES - 1]);
+        lanes
+    }
+
+    /// Every lane takes the value of the one after, the last takes `last`.
+    #[inline(always)]
+    pub fn previous_lane(&self, last: f32) -> Lanes {
+        let mut lanes = Lanes([last; LANES]);
+        lanes.0[..LANES - 1].copy_from_slice(&self.0[1..]);
+        lanes
+    }
+
+    /// Both groups of a vector path.
+    #[inline(always)]
+    pub unsafe fn load<S: Simd>(&self) -> [S::F; 2] {
+        // SAFETY: as the caller's; 16 floats are two groups.
+        unsafe { [S::load(self.0.as_ptr()), S::load(self.0.as_ptr().add(GROUP))] }
+    }
+
+    /// Replaces one of both groups.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`; `group` is 0 or 1.
+    #[inline(always)]
+    pub unsafe fn store_group<S: Simd>(&mut self, group: usize, value: S::F) {
+        // SAFETY: as the caller's; 16 floats are two groups.
+        unsafe { S::store(self.0.as_mut_ptr().add(group * GROUP), value) };
+    }
+}
+
+/// How a row of pixels lies in lane order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct LaneOrder {
+    pub width: usize,
+    /// Pixels in a segment, so elements in a row.
+    pub segment: usize,
+}
+
+impl LaneOrder {
+    pub fn new(width: usize) -> Self {
+        LaneOrder { width, segment: width.div_ceil(LANES) }
+    }
+
+    /// Element and lane of a pixel.
+    #[inline(always)]
+    pub fn place(&self, x: usize) -> (usize, usize) {
+        (x % self.segment, x / self.segment)
+    }
+
+    /// Reads a row of floats, `stride` bytes apart, into lane order. Elements past the row's end stay as they are.
+    ///
+    /// # Safety
+    /// `row` is valid for `width` reads.
+    #[inline(always)]
+    pub unsafe fn read(&self, row: *const f32, stride: usize, to: &mut [Lanes]) {
+        let to = to[..self.segment].as_mut_ptr().cast::<f32>();
+        let lane_stride = self.segment * stride;
+        for lane in (0..LANES).step_by(4) {
+            // Elements that all four lanes have.
+            let together = self.width.saturating_sub((lane + 3) * self.segment).min(self.segment);
+            let mut from = row.wrapping_byte_add(lane * lane_stride);
+            for element in 0..together {
+                // SAFETY: the pixels' columns are below the width; element < segment = length of `to`.
+                unsafe {
+                    let to = to.add(element * LANES + lane).cast::<[f32; 4]>();
+                    to.write([
+                        from.read(),
+                        from.byte_add(lane_stride).read(),
+                        from.byte_add(2 * lane_stride).read(),
+                        from.byte_add(3 * lane_stride).read(),
+                    ]);
+                }
+                from = from.wrapping_byte_add(stride);
+            }
+            for lane in lane..lane + 4 {
+                let start = lane * self.segment;
+                for element in together..self.segment.min(self.width.saturating_sub(start)) {
+                    // SAFETY: start + element < width, and element < segment = length of `to`.
+                    unsafe {
+                        let from = row.byte_add((start + element) * stride);
+                        to.add(element * LANES + lane).write(from.read());
+                    }
+                }
+            }
+        }
+    }
+
+    /// Writes elements in lane order as a row of floats. `row` has room for all lanes, also those past the width.
+    #[inline(always)]
+    pub fn write(&self, from: &[Lanes], row: &mut [f32]) {
+        let (from, row) = (&from[..self.segment], &mut row[..self.segment * LANES]);
+        let whole = self.segment / 4 * 4;
+        for element in (0..whole).step_by(4) {
+            for lane in (0..LANES).step_by(4) {
+                // SAFETY: 4 elements of 4 lanes lie inside `from`; 4 floats of 4 segments inside `row`.
+                unsafe {
+                    let from = from.as_ptr().add(element).cast::<f32>().add(lane);
+                    let to = row.as_mut_ptr().add(lane * self.segment + element);
+                    transpose4(from, LANES, to, self.segment);
+                }
+            }
+        }
+        for element in whole..self.segment {
+            for lane in 0..LANES {
+                row[lane * self.segment + element] = from[element].0[lane];
+            }
+        }
+    }
+}
+
+/// Transposes 4 x 4 floats; the strides of the rows count floats.
+///
+/// # Safety
+/// `from` is valid for reads, `to` for writes of four floats at each of four rows.
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+unsafe fn transpose4(from: *const f32, from_stride: usize, to: *mut f32, to_stride: usize) {
+    use std::arch::x86_64::*;
+    // SAFETY: promised by the caller; SSE is part of every x86-64.
+    unsafe {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|row| _mm_loadu_ps(from.add(row * from_stride)));
+        let (ab_low, cd_low) = (_mm_unpacklo_ps(a, b), _mm_unpacklo_ps(c, d));
+        let (ab_high, cd_high) = (_mm_unpackhi_ps(a, b), _mm_unpackhi_ps(c, d));
+        _mm_storeu_ps(to, _mm_movelh_ps(ab_low, cd_low));
+        _mm_storeu_ps(to.add(to_stride), _mm_movehl_ps(cd_low, ab_low));
+        _mm_storeu_ps(to.add(2 * to_stride), _mm_movelh_ps(ab_high, cd_high));
+        _mm_storeu_ps(to.add(3 * to_stride), _mm_movehl_ps(cd_high, ab_high));
+    }
+}
+
+/// Transposes 4 x 4 floats; the strides of the rows count floats.
+///
+/// # Safety
+/// `from` is valid for reads, `to` for writes of four floats at each of four rows.
+#[cfg(not(target_arch = "x86_64"))]
+#[inline(always)]
+unsafe fn transpose4(from: *const f32, from_stride: usize, to: *mut f32, to_stride: usize) {
+    for row in 0..4 {
+        for column in 0..4 {
+            // SAFETY: promised by the caller.
+            unsafe {
+                to.add(column * to_stride + row).write(from.add(row * from_stride + column).read())
+            };
+        }
+    }
+}

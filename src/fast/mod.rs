@@ -1,0 +1,439 @@
+//! The fast form of the whole method: the same steps as the plain form, over lanes, rows and tiles.
+//!
+//! First the windows of the whole image (`windows`), then tile by tile the points (`planes`), the method's rings of
+//! sums (`strips`, `moments`, `half_windows`) and the normals (`tile`). Tiles are fixed by the frame and the options,
+//! so that results do not depend on the number of threads.
+
+mod arithmetic;
+mod half_windows;
+mod lanes;
+mod moments;
+mod planes;
+mod sink;
+mod strips;
+mod tile;
+mod windows;
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use half_windows::HalfWindows;
+use lanes::Lanes;
+use moments::Moments;
+use planes::{Frame, Planes};
+use sink::Sink;
+use strips::Strips;
+use tile::{BeyondLimit, Sums, Tile};
+use windows::{Sweep, WindowRows, row_length, sides};
+
+use crate::Error;
+use crate::cloud::{Normals, Points};
+use crate::isa::Isa;
+use crate::options::{Method, Options};
+use crate::simd::{GROUP, Simd};
+use crate::smoothing_area::depth_smoothing;
+use crate::threads::Workers;
+use crate::window::Image;
+
+/// Images smaller than this in one direction are left to the plain form.
+pub(crate) const SMALLEST_IMAGE: usize = 3;
+
+/// Rows of a tile: the rows around it that its windows reach are read again for the next one.
+const TILE_ROWS: usize = 128;
+
+/// Bytes of a tile's rings, to stay in the second-level cache beside what streams through it.
+const TILE_BYTES: usize = 256 << 10;
+
+/// Scratch memory and threads, reused from frame to frame.
+#[derive(Debug, Default)]
+pub(crate) struct Scratch {
+    workers: Workers,
+    rows: Vec<Lanes>,
+    each: Vec<Mutex<WorkerScratch>>,
+    listed: Vec<(u32, u32)>,
+    chunks: Vec<Chunk>,
+}
+
+/// What one worker needs.
+#[derive(Debug, Default)]
+struct WorkerScratch {
+    sweep: Sweep,
+    frame: Frame,
+    planes: Planes,
+    moments: Moments,
+    strips: Strips<false>,
+    simple_strips: Strips<true>,
+    half_windows: HalfWindows,
+}
+
+impl Scratch {
+    /// Bytes held.
+    pub fn size(&self) -> usize {
+        let each = self.each.iter().map(|scratch| lock(scratch).size()).sum::<usize>();
+        self.rows.capacity() * size_of::<Lanes>()
+            + self.listed.capacity() * size_of::<(u32, u32)>()
+            + self.chunks.capacity() * size_of::<Chunk>()
+            + each
+    }
+}
+
+impl WorkerScratch {
+    fn size(&self) -> usize {
+        self.sweep.size()
+            + self.planes.size()
+            + self.moments.size()
+            + self.strips.size()
+            + self.simple_strips.size()
+            + self.half_windows.size()
+    }
+}
+
+fn lock(scratch: &Mutex<WorkerScratch>) -> MutexGuard<'_, WorkerScratch> {
+    scratch.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Image rows that are swept together, with the rows around them whose depth changes reach them.
+#[derive(Clone, Debug)]
+struct Chunk {
+    own: Range<usize>,
+    swept: Range<usize>,
+    /// Where the swept rows start among the rows of the map.
+    start: usize,
+}
+
+/// One computation.
+struct Job<'a> {
+    isa: Isa,
+    points: &'a Points<'a>,
+    options: &'a Options,
+    image: Image,
+    whole_points: bool,
+}
+
+/// The normals of the pixels that `indices` list, or of all.
+pub(crate) fn compute(
+    isa: Isa,
+    points: &Points,
+    options: &Options,
+    indices: Option<&[i32]>,
+    normals: &Normals,
+    scratch: &mut Scratch,
+) -> Result<(), Error> {
+    scratch.workers.prepare(options.threads)?;
+    let (width, height) = (points.width(), points.height());
+    let Scratch { workers, rows, each, listed, chunks } = scratch;
+    let count = workers.count();
+    each.resize_with(count.max(each.len()), Mutex::default);
+
+    let image = Image { width, height, border_policy: options.border_policy };
+    let whole_points = points.has_whole_points(normals);
+    let job = Job { isa, points, options, image, whole_points };
+
+    // One sweep over all rows needs no bound on its reach.
+    let reach = if count > 1 { job.reach(job.deepest(workers)) } else { height };
+    share_out(height, count, reach, chunks);
+    let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
+    let length = row_length(width);
+    reserve(rows, swept * length)?;
+    let limit = job.sweep(workers, each, chunks, &mut rows[..swept * length]);
+
+    let reach = job.reach(limit);
+    let rows = &rows[..swept * length];
+    let per_chunk = chunks[0].own.len();
+    let sides = |y: usize| {
+        let chunk = &chunks[y / per_chunk];
+        sides(rows, width, chunk.start + y - chunk.swept.start)
+    };
+    let sink = match indices {
+        None => Sink::All(normals),
+        Some(indices) => {
+            listed.clear();
+            listed.try_reserve(indices.len()).map_err(|_| Error::OutOfMemory)?;
+            listed.extend(indices.iter().zip(0..).map(|(index, at)| (*index as u32, at)));
+            listed.sort_unstable();
+            Sink::Listed { normals, listed, width }
+        }
+    };
+    if job.tiles(workers, each, reach, limit, &sides, &sink).is_err() {
+        let limit = job.largest_coordinate();
+        // No coordinate is beyond this limit.
+        let _ = job.tiles(workers, each, reach, limit, &sides, &sink);
+    }
+    Ok(())
+}
+
+/// Grows a buffer to `length` elements.
+fn reserve(rows: &mut Vec<Lanes>, length: usize) -> Result<(), Error> {
+    if rows.len() < length {
+        rows.try_reserve(length - rows.len()).map_err(|_| Error::OutOfMemory)?;
+        rows.resize(length, Lanes::ZERO);
+    }
+    Ok(())
+}
+
+/// The rows shared out to `count` sweeps. A depth change more than `reach` away decides no window, so each sweep can
+/// start and end that far around its own rows.
+fn share_out(height: usize, count: usize, reach: usize, chunks: &mut Vec<Chunk>) {
+    let per_chunk = height.div_ceil(count);
+    let per_chunk = if per_chunk < 2 * reach { height } else { per_chunk };
+    let mut start = 0;
+    let first_rows = (0..height).step_by(per_chunk);
+    chunks.clear();
+    chunks.extend(first_rows.map(|first| {
+        let own = first..(first + per_chunk).min(height);
+        let swept = own.start.saturating_sub(reach)..(own.end + reach).min(height);
+        start += swept.len();
+        Chunk { own, start: start - swept.len(), swept }
+    }));
+}
+
+/// Lends every item of a slice to one worker at a time.
+struct Parts<T>(*mut T);
+
+// SAFETY: each part is used by one thread only, as the caller of `part` promises.
+unsafe impl<T: Send> Sync for Parts<T> {}
+
+impl<T> Parts<T> {
+    /// # Safety
+    /// The range is inside the slice, and no other part of it is in use.
+    #[allow(clippy::mut_from_ref)]
+    unsafe fn part(&self, range: Range<usize>) -> &mut [T] {
+        // SAFETY: promised by the caller.
+        unsafe { std::slice::from_raw_parts_mut(self.0.add(range.start), range.len()) }
+    }
+}
+
+impl Job<'_> {
+    /// How far a window, or a depth change that decides one, can be from its pixel, where no depth is above `deepest`.
+    fn reach(&self, deepest: f32) -> usize {
+        let smoothing = depth_smoothing(deepest, self.options);
+        (smoothing as usize).saturating_add(2).min(self.image.width + self.image.height)
+    }
+
+    /// The largest finite magnitude of the depths.
+    fn deepest(&self, workers: &Workers) -> f32 {
+        let deepest = AtomicU32::new(0);
+        workers.for_each(self.image.height, |_, y| {
+            let depths = (0..self.image.width).map(|x| self.points.z(x, y).abs());
+            let largest = depths.filter(|z| z.is_finite()).fold(0.0, f32::max);
+            // Positive floats are in the order of their bits.
+            deepest.fetch_max(largest.to_bits(), Ordering::Relaxed);
+        });
+        f32::from_bits(deepest.into_inner())
+    }
+
+    /// Steps 1 to 3: fills the rows with sides of windows. Returns the largest magnitude of a finite depth.
+    fn sweep(
+        &self,
+        workers: &Workers,
+        each: &[Mutex<WorkerScratch>],
+        chunks: &[Chunk],
+        rows: &mut [Lanes],
+    ) -> f32 {
+        let length = row_length(self.image.width);
+        let rows = Parts(rows.as_mut_ptr());
+        let limit = AtomicU32::new(0);
+        workers.for_each(chunks.len(), |worker, item| {
+            let chunk = &chunks[item];
+            let places = chunk.start * length..(chunk.start + chunk.swept.len()) * length;
+            // SAFETY: chunks have rows of their own.
+            let rows = unsafe { rows.part(places) };
+            let sweep = &mut lock(&each[worker]).sweep;
+            // SAFETY: the processor has the instruction set of the job.
+            let largest = unsafe { paths::sweep(self, chunk, rows, sweep) };
+            // Positive floats are in the order of their bits.
+            limit.fetch_max(largest.to_bits(), Ordering::Relaxed);
+        });
+        f32::from_bits(limit.into_inner())
+    }
+
+    /// Steps 4 and 5, all tiles.
+    fn tiles<'r>(
+        &self,
+        workers: &Workers,
+        each: &[Mutex<WorkerScratch>],
+        reach: usize,
+        limit: f32,
+        sides: &(impl Fn(usize) -> &'r [f32] + Sync),
+        sink: &Sink,
+    ) -> Result<(), BeyondLimit> {
+        let Image { width, height, .. } = self.image;
+        let column = 3 * size_of::<f32>()
+            + match self.options.method {
+                Method::CovarianceMatrix => Moments::COLUMN,
+                Method::Average3DGradient => Strips::<false>::COLUMN,
+                Method::AverageDepthChange => HalfWindows::COLUMN,
+                Method::Simple3DGradient => Strips::<true>::COLUMN,
+            };
+        let ring = (reach + 2).next_power_of_two();
+        let columns = (TILE_BYTES / (column * ring)).max(2 * reach).next_multiple_of(2 * GROUP);
+        let across = width.div_ceil(columns);
+        // Tiles of like widths.
+        let columns = width.div_ceil(across).next_multiple_of(GROUP);
+        let down = height.div_ceil(TILE_ROWS);
+        let beyond = AtomicBool::new(false);
+        workers.for_each(across * down, |worker, item| {
+            let (row, column) = (item / across * TILE_ROWS, item % across * columns);
+            if column >= width || beyond.load(Ordering::Relaxed) {
+                return;
+            }
+            let tile = Tile {
+                points: self.points,
+                options: self.options,
+                image: &self.image,
+                columns: column..(column + columns).min(width),
+                rows: row..(row + TILE_ROWS).min(height),
+                limit,
+                whole_points: self.whole_points,
+            };
+            let scratch = &mut lock(&each[worker]);
+            // SAFETY: the processor has the instruction set of the job, and tiles do not share pixels.
+            if unsafe { paths::tile(self.isa, &tile, scratch, sides, sink) }.is_err() {
+                beyond.store(true, Ordering::Relaxed);
+            }
+        });
+        if beyond.into_inner() { Err(BeyondLimit) } else { Ok(()) }
+    }
+
+    /// The largest magnitude of a finite coordinate.
+    fn largest_coordinate(&self) -> f32 {
+        let rows = (0..self.image.height)
+            .flat_map(|y| (0..self.image.width).flat_map(move |x| self.points.at(x, y)));
+        rows.map(f32::abs).filter(|c| c.is_finite()).fold(0.0, f32::max)
+    }
+}
+
+/// The sweeps over one chunk of rows.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn sweep<S: Simd>(job: &Job, chunk: &Chunk, rows: &mut [Lanes], sweep: &mut Sweep) -> f32 {
+    let mut windows = WindowRows::new(job.image.width, rows);
+    let swept = (chunk.swept.start, chunk.swept.len());
+    // SAFETY: as the caller's.
+    unsafe {
+        let largest = windows.sweep_down::<S>(job.points, job.options, swept, sweep);
+        windows.sweep_up::<S>(job.points, job.options, swept, sweep);
+        largest
+    }
+}
+
+/// One tile, with the sums of its method.
+///
+/// # Safety
+/// The processor has the instruction set of `S`; no one else writes the tile's pixels.
+#[inline(always)]
+unsafe fn tile<'r, S: Simd>(
+    tile: &Tile,
+    scratch: &mut WorkerScratch,
+    sides: &impl Fn(usize) -> &'r [f32],
+    sink: &Sink,
+) -> Result<(), BeyondLimit> {
+    let WorkerScratch { frame, planes, moments, strips, simple_strips, half_windows, .. } = scratch;
+    // SAFETY: as the caller's.
+    unsafe {
+        match tile.options.method {
+            Method::CovarianceMatrix => tile.compute::<S, _>(frame, planes, moments, sides, sink),
+            Method::Average3DGradient => tile.compute::<S, _>(frame, planes, strips, sides, sink),
+            Method::AverageDepthChange => {
+                tile.compute::<S, _>(frame, planes, half_windows, sides, sink)
+            }
+            Method::Simple3DGradient => {
+                tile.compute::<S, _>(frame, planes, simple_strips, sides, sink)
+            }
+        }
+    }
+}
+
+/// The outermost functions, each compiled for its instruction set.
+mod paths {
+    use super::*;
+    use crate::simd::portable::Portable;
+    #[cfg(target_arch = "x86_64")]
+    use crate::simd::x86::{Avx2, Sse2};
+
+    macro_rules! path {
+        ($name:ident, $simd:ty $(, $feature:literal)?) => {
+            mod $name {
+                use super::*;
+
+                /// # Safety
+                /// The processor has this instruction set.
+                $(#[target_feature(enable = $feature)])?
+                pub unsafe fn sweep(job: &Job, chunk: &Chunk, rows: &mut [Lanes], sweep: &mut Sweep) -> f32 {
+                    // SAFETY: as the caller's.
+                    unsafe { super::super::sweep::<$simd>(job, chunk, rows, sweep) }
+                }
+
+                /// # Safety
+                /// The processor has this instruction set; no one else writes the tile's pixels.
+                $(#[target_feature(enable = $feature)])?
+                pub unsafe fn tile<'r>(
+                    tile: &Tile,
+                    scratch: &mut WorkerScratch,
+                    sides: &impl Fn(usize) -> &'r [f32],
+                    sink: &Sink,
+                ) -> Result<(), BeyondLimit> {
+                    // SAFETY: as the caller's.
+                    unsafe { super::super::tile::<$simd>(tile, scratch, sides, sink) }
+                }
+            }
+        };
+    }
+
+    path!(portable, Portable);
+    #[cfg(target_arch = "x86_64")]
+    path!(sse2, Sse2);
+    #[cfg(target_arch = "x86_64")]
+    path!(avx2, Avx2, "avx2");
+    #[cfg(target_arch = "x86_64")]
+    path!(avx512, Avx2, "avx2,avx512f,avx512vl,avx512dq,avx512bw");
+    #[cfg(target_arch = "aarch64")]
+    path!(neon, crate::simd::neon::Neon, "neon");
+
+    /// # Safety
+    /// The processor has the instruction set of the job.
+    pub unsafe fn sweep(job: &Job, chunk: &Chunk, rows: &mut [Lanes], scratch: &mut Sweep) -> f32 {
+        // SAFETY: as the caller's.
+        unsafe {
+            match job.isa {
+                #[cfg(target_arch = "x86_64")]
+                Isa::Sse2 => sse2::sweep(job, chunk, rows, scratch),
+                #[cfg(target_arch = "x86_64")]
+                Isa::Avx2 => avx2::sweep(job, chunk, rows, scratch),
+                #[cfg(target_arch = "x86_64")]
+                Isa::Avx512 => avx512::sweep(job, chunk, rows, scratch),
+                #[cfg(target_arch = "aarch64")]
+                Isa::Neon => neon::sweep(job, chunk, rows, scratch),
+                _ => portable::sweep(job, chunk, rows, scratch),
+            }
+        }
+    }
+
+    /// # Safety
+    /// The processor has the instruction set; no one else writes the tile's pixels.
+    pub unsafe fn tile<'r>(
+        isa: Isa,
+        tile: &Tile,
+        scratch: &mut WorkerScratch,
+        sides: &impl Fn(usize) -> &'r [f32],
+        sink: &Sink,
+    ) -> Result<(), BeyondLimit> {
+        // SAFETY: as the caller's.
+        unsafe {
+            match isa {
+                #[cfg(target_arch = "x86_64")]
+                Isa::Sse2 => sse2::tile(tile, scratch, sides, sink),
+                #[cfg(target_arch = "x86_64")]
+                Isa::Avx2 => avx2::tile(tile, scratch, sides, sink),
+                #[cfg(target_arch = "x86_64")]
+                Isa::Avx512 => avx512::tile(tile, scratch, sides, sink),
+                #[cfg(target_arch = "aarch64")]
+                Isa::Neon => neon::tile(tile, scratch, sides, sink),
+                _ => portable::tile(tile, scratch, sides, sink),
+            }
+        }
+    }
+}

@@ -1,0 +1,325 @@
+//! Sums of first and second moments, for COVARIANCE_MATRIX: the paper's nine integral images (Eq. 16-25), in f64 and
+//! about a point of the tile.
+
+use super::arithmetic::{Doubles, Floats, dot};
+use super::planes::{Frame, MARGIN, Planes, grow};
+use super::tile::{Found, Sums};
+use crate::simd::twice::Twice;
+use crate::simd::{GROUP, Simd};
+use crate::window::Image;
+
+/// x, y, z, xx, xy, xz, yy, yz, zz
+const CHANNELS: usize = 9;
+
+/// The ring of integral rows: nine planes a row.
+#[derive(Debug, Default)]
+pub(crate) struct Moments {
+    integrals: Vec<f64>,
+    /// The row pushed last, less the origin.
+    centered: Vec<f64>,
+    origin: [f32; 3],
+    /// The place of the row pushed last; before the first the one after the ring, which is zero.
+    last: usize,
+    /// What the sums' rounding errors stay below.
+    error: f64,
+}
+
+/// The moments of windows, and their numbers of points.
+pub(crate) struct WindowMoments<T> {
+    sums: [T; CHANNELS],
+    count: T,
+}
+
+impl<T: Copy> Clone for WindowMoments<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+impl<T: Copy> Copy for WindowMoments<T> {}
+
+/// One unit in the last place of a double, and how many of it the path to a sum may gather.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// Newton steps for the eigenvalue: one or two are usual, a few more where two eigenvalues are near.
+const STEPS: usize = 8;
+
+/// The step from which on one more changes the normal by less than 1e-6.
+const CONVERGED: f64 = 1e-3;
+
+/// A normal is doubtful if the error of the sums could turn it by more than 1e-5.
+const DOUBT_SUMS: f64 = 1e5;
+
+/// The least product of the eigenvalues' distances (of a matrix of trace 1) for a plane in doubles.
+const DOUBT_PLANE: f64 = 1e-9;
+
+impl Moments {
+    /// Where the row at a place of the ring starts; its planes are a stride apart.
+    #[inline(always)]
+    fn start_of(frame: &Frame, place: usize) -> usize {
+        place * CHANNELS * frame.stride
+    }
+}
+
+impl Sums for Moments {
+    type Of8<S: Simd> = WindowMoments<Doubles<S>>;
+    type Of1 = WindowMoments<f64>;
+
+    const COLUMN: usize = CHANNELS * size_of::<f64>();
+    const CURVATURE: bool = true;
+
+    fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, origin: [f32; 3]) {
+        let zero = Self::start_of(frame, frame.ring)..Self::start_of(frame, frame.ring + 1);
+        grow(&mut self.integrals, zero.end);
+        self.integrals[zero].fill(0.0);
+        grow(&mut self.centered, 3 * frame.stride);
+        self.origin = origin;
+        self.last = frame.ring;
+    }
+
+    fn size(&self) -> usize {
+        (self.integrals.capacity() + self.centered.capacity()) * size_of::<f64>()
+    }
+
+    #[inline(always)]
+    unsafe fn push<S: Simd>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
+        let place = frame.place(y);
+        let groups = frame.groups() + 1;
+        let (stride, plane) = (frame.stride, 3 * frame.stride);
+        assert!(MARGIN + groups * GROUP <= stride && plane <= self.centered.len());
+        assert!(Self::start_of(frame, frame.ring + 1) <= self.integrals.len());
+        let from = planes.rows(frame, y);
+        let centered = self.centered.as_mut_ptr();
+        let above = self.integrals.as_ptr().wrapping_add(Self::start_of(frame, self.last));
+        let row = self.integrals.as_mut_ptr().wrapping_add(Self::start_of(frame, place));
+        // SAFETY: as the caller's; the groups lie inside the planes and rows, whose lengths were just checked.
+        unsafe {
+            for c in 0..3 {
+                let origin = Floats::<S>::splat(self.origin[c]).widen();
+                for group in 0..groups {
+                    let at = MARGIN + group * GROUP;
+                    let coordinate = Floats::<S>(S::load(from[c].as_ptr().add(at))).widen();
+                    S::store_d(centered.add(c * stride + at), (coordinate - origin).0);
+                }
+            }
+            let coordinate = |c: usize| centered.wrapping_add(c * stride).cast_const();
+            for c in 0..3 {
+                integrate::<S, 1>([coordinate(c)], above, row, c * stride, groups);
+            }
+            let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+            for (c, (a, b)) in (3..).zip(pairs) {
+                integrate::<S, 2>([coordinate(a), coordinate(b)], above, row, c * stride, groups);
+            }
+        }
+        self.last = place;
+        let end = Self::start_of(frame, place) + MARGIN + groups * GROUP - 1;
+        let square = |c: usize| self.integrals[end + c * stride];
+        self.error = ROUNDING * (square(3) + square(6) + square(8));
+    }
+
+    #[inline(always)]
+    unsafe fn of_group<S: Simd>(
+        &self,
+        frame: &Frame,
+        _planes: &Planes,
+        x: usize,
+        y: usize,
+        side: usize,
+    ) -> Self::Of8<S> {
+        let half = side / 2;
+        let left = frame.column(x.wrapping_sub(half + 1));
+        let integrals = self.integrals.as_ptr();
+        // SAFETY: as the caller's: rows and columns are held, and so are the groups from these columns on.
+        unsafe {
+            let top = integrals.add(Self::start_of(frame, frame.place(y - half - 1)) + left);
+            let bottom =
+                integrals.add(Self::start_of(frame, frame.place(y - half + side - 1)) + left);
+            let mut sums = [Doubles::splat(0.0); CHANNELS];
+            for c in 0..CHANNELS {
+                let (top, bottom) = (top.add(c * frame.stride), bottom.add(c * frame.stride));
+                let lower = Doubles(S::load_d(bottom.add(side))) - Doubles(S::load_d(bottom));
+                let upper = Doubles(S::load_d(top.add(side))) - Doubles(S::load_d(top));
+                sums[c] = lower - upper;
+            }
+            WindowMoments { sums, count: Doubles::splat((side * side) as f64) }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn select<S: Simd>(lanes: u32, yes: Self::Of8<S>, no: Self::Of8<S>) -> Self::Of8<S> {
+        let mut moments = no;
+        // SAFETY: as the caller's.
+        unsafe {
+            for c in 0..CHANNELS {
+                let sum = S::select_bits_d(lanes, yes.sums[c].0, no.sums[c].0);
+                moments.sums[c] = Doubles(sum);
+            }
+            moments.count = Doubles(S::select_bits_d(lanes, yes.count.0, no.count.0));
+        }
+        moments
+    }
+
+    #[inline(always)]
+    fn pair<S: Simd>(first: Self::Of8<S>, second: Self::Of8<S>) -> Self::Of8<Twice<S>> {
+        let both = |a: Doubles<S>, b: Doubles<S>| Doubles([a.0, b.0]);
+        let mut sums = [both(first.sums[0], second.sums[0]); CHANNELS];
+        for c in 1..CHANNELS {
+            sums[c] = both(first.sums[c], second.sums[c]);
+        }
+        WindowMoments { sums, count: both(first.count, second.count) }
+    }
+
+    #[inline(always)]
+    unsafe fn none<S: Simd>() -> Self::Of8<S> {
+        // SAFETY: as the caller's.
+        let zero = unsafe { Doubles::splat(0.0) };
+        WindowMoments { sums: [zero; CHANNELS], count: zero }
+    }
+
+    fn of_mirrored(
+        &self,
+        frame: &Frame,
+        _planes: &Planes,
+        image: &Image,
+        (x, y): (usize, usize),
+        side: usize,
+    ) -> Option<Self::Of1> {
+        let half = (side / 2) as isize;
+        let mut moments = WindowMoments { sums: [0.0; CHANNELS], count: 0.0 };
+        for rect in image.rects((x as isize - half, y as isize - half), (side, side)) {
+            if rect.x.is_empty() || rect.y.is_empty() {
+                continue;
+            }
+            moments.count += (rect.x.len() * rect.y.len()) as f64;
+            for (c, sum) in moments.sums.iter_mut().enumerate() {
+                let segment = |end_row: usize| {
+                    if end_row == 0 {
+                        return 0.0;
+                    }
+                    let place = frame.place(end_row - 1);
+                    let row = Self::start_of(frame, place) + c * frame.stride;
+                    self.integrals[row + frame.column(rect.x.end) - 1]
+                        - self.integrals[row + frame.column(rect.x.start) - 1]
+                };
+                *sum += segment(rect.y.end) - segment(rect.y.start);
+            }
+        }
+        Some(moments)
+    }
+
+    #[inline(always)]
+    unsafe fn put<S: Simd>(moments: &mut Self::Of8<S>, lane: usize, one: Self::Of1) {
+        // SAFETY: as the caller's.
+        unsafe {
+            for (to, one) in moments.sums.iter_mut().zip(one.sums) {
+                *to = Doubles(S::select_bits_d(1 << lane, S::splat_d(one), to.0));
+            }
+            let count = S::splat_d(one.count);
+            moments.count = Doubles(S::select_bits_d(1 << lane, count, moments.count.0));
+        }
+    }
+
+    /// The eigenvector of the smallest eigenvalue: the least root of the characteristic polynomial by one step of
+    /// Laguerre's method from 0 and Newton steps, then a column of the adjugate.
+    #[inline(always)]
+    unsafe fn estimate<S: Simd>(
+        &self,
+        _frame: &Frame,
+        moments: &Self::Of8<S>,
+        _sides: S::F,
+        lanes: u32,
+    ) -> Found<S> {
+        // SAFETY: as the caller's.
+        unsafe {
+            let one = Doubles::<S>::splat(1.0);
+            let [x, y, z, xx, xy, xz, yy, yz, zz] = moments.sums;
+            let share = one / moments.count;
+            let (mx, my, mz) = (x * share, y * share, z * share);
+            let (xx, xy, xz) = (xx - x * mx, xy - x * my, xz - x * mz);
+            let (yy, yz, zz) = (yy - y * my, yz - y * mz, zz - z * mz);
+            // Trace 1.
+            let trace = xx + yy + zz;
+            let scale = one / trace;
+            let (xx, xy, xz) = (xx * scale, xy * scale, xz * scale);
+            let (yy, yz, zz) = (yy * scale, yz * scale, zz * scale);
+
+            // value^3 - value^2 + c1 value - c0 = 0
+            let (minor_x, minor_y, minor_z) =
+                (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
+            let c1 = minor_x + minor_y + minor_z;
+            let c0 = xx * minor_x + xy * (xz * yz - xy * zz) + xz * (xy * yz - xz * yy);
+            let mut value = {
+                let (c0, c1) = (c0.narrow(), c1.narrow());
+                let square = Floats::splat(4.0) * c1 * c1 - Floats::splat(12.0) * c0;
+                let root = square.max(Floats::splat(0.0)).sqrt();
+                (Floats::splat(3.0) * c0 / (c1 + root)).widen()
+            };
+            let (two, three) = (one + one, one + one + one);
+            let (zero, converged) = (Doubles::splat(0.0), Doubles::splat(CONVERGED));
+            let (mut slope, mut unsettled) = (zero, lanes);
+            for _ in 0..STEPS {
+                slope = (three * value - two) * value + c1;
+                let step = (((value - one) * value + c1) * value - c0) / slope;
+                value = value - step;
+                unsettled = !step.max(zero - step).lt(converged * slope) & lanes;
+                if unsettled == 0 {
+                    break;
+                }
+            }
+            let value = value.max(zero);
+
+            // The adjugate of the matrix less the eigenvalue: each column is along the eigenvector.
+            let (xx, yy, zz) = (xx - value, yy - value, zz - value);
+            let (a_xx, a_yy, a_zz) = (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
+            let (a_xy, a_xz, a_yz) = (xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz);
+            // The column with the longest diagonal element, scaled by it.
+            let best_xy = a_xx.max(a_yy);
+            let scale = one / best_xy.max(a_zz);
+            let columns = [[a_xx, a_xy, a_xz], [a_xy, a_yy, a_yz], [a_xz, a_yz, a_zz]];
+            let mut n = [Floats::splat(0.0); 3];
+            for c in 0..3 {
+                let of_xy = a_xx.select_lt(a_yy, columns[1][c], columns[0][c]);
+                n[c] = (best_xy.select_lt(a_zz, columns[2][c], of_xy) * scale).narrow();
+            }
+            let scale = Floats::splat(1.0) / dot(n, n).sqrt();
+            let least = Doubles::splat(DOUBT_SUMS * self.error);
+            // Where the points lie on a line, the steps may end at the largest eigenvalue instead.
+            let is_smallest = value.lt(Doubles::splat(1.0 / 3.0));
+            let sure =
+                Doubles::splat(DOUBT_PLANE).lt(slope) & least.lt(slope * trace) & is_smallest;
+            Found {
+                normal: [n[0] * scale, n[1] * scale, n[2] * scale],
+                curvature: value.narrow(),
+                doubtful: !sure | unsettled,
+            }
+        }
+    }
+}
+
+/// One plane of an integral row (Eq. 2) of the products of `FACTORS` rows.
+///
+/// # Safety
+/// The processor has the instruction set of `S`; the groups are inside the rows, and in the planes after the margin.
+#[inline(always)]
+unsafe fn integrate<S: Simd, const FACTORS: usize>(
+    factors: [*const f64; FACTORS],
+    above: *const f64,
+    row: *mut f64,
+    plane: usize,
+    groups: usize,
+) {
+    // SAFETY: as the caller's.
+    unsafe {
+        row.add(plane + MARGIN - 1).write(0.0);
+        let mut carry = S::splat_d(0.0);
+        for group in 0..groups {
+            let at = MARGIN + group * GROUP;
+            let mut product = S::load_d(factors[0].add(at));
+            if FACTORS == 2 {
+                product = S::mul_d(product, S::load_d(factors[1].add(at)));
+            }
+            let along = S::add_d(S::prefix_sum_d(product), carry);
+            carry = S::last_d(along);
+            S::store_d(row.add(plane + at), S::add_d(along, S::load_d(above.add(plane + at))));
+        }
+    }
+}

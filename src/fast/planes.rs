@@ -1,0 +1,135 @@
+//! A tile's points as three planes of floats, a ring of rows: what the methods' sums are made from.
+
+use std::ops::Range;
+
+use crate::cloud::Points;
+use crate::simd::{GROUP, Simd};
+
+/// Columns before and after a row's own, so that groups and the column before the first need no special case.
+pub(crate) const MARGIN: usize = GROUP;
+
+/// Where the rows and columns of a tile lie in its rings.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Frame {
+    /// The image's columns that are held; the first is a multiple of the group.
+    pub columns: Range<usize>,
+    /// Elements from a row to the next.
+    pub stride: usize,
+    /// Rows in a ring, a power of two.
+    pub ring: usize,
+    /// The image's rows that are pushed through the rings.
+    pub rows: Range<usize>,
+}
+
+impl Frame {
+    pub fn set(&mut self, columns: Range<usize>, rows: Range<usize>, ring: usize) {
+        debug_assert!(columns.start.is_multiple_of(GROUP));
+        self.stride = (columns.len() + 2 * MARGIN).next_multiple_of(GROUP) + MARGIN;
+        self.ring = ring.next_power_of_two();
+        self.columns = columns;
+        self.rows = rows;
+    }
+
+    /// Groups that cover the columns.
+    pub fn groups(&self) -> usize {
+        self.columns.len().div_ceil(GROUP)
+    }
+
+    /// The ring's row in which row `y` is held while it is.
+    #[inline(always)]
+    pub fn place(&self, y: usize) -> usize {
+        y & (self.ring - 1)
+    }
+
+    /// Index of column `x` in a row; `x` may be up to the margin before the columns.
+    #[inline(always)]
+    pub fn column(&self, x: usize) -> usize {
+        x.wrapping_add(MARGIN).wrapping_sub(self.columns.start)
+    }
+}
+
+/// Grows a buffer to `length` without touching what is there.
+pub(crate) fn grow<T: Copy + Default>(buffer: &mut Vec<T>, length: usize) {
+    if buffer.len() < length {
+        buffer.resize(length, T::default());
+    }
+}
+
+/// The ring of x, y and z rows. Points that miss a coordinate are (0, 0, 0).
+#[derive(Debug, Default)]
+pub(crate) struct Planes {
+    data: Vec<f32>,
+}
+
+/// What a row of points was like.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct RowNews {
+    /// A point has a finite z but not a finite x or y: no depth change tells of it.
+    pub hidden: bool,
+    /// A finite coordinate is larger than the limit.
+    pub beyond: bool,
+}
+
+impl Planes {
+    pub fn resize(&mut self, frame: &Frame) {
+        grow(&mut self.data, 3 * frame.ring * frame.stride);
+    }
+
+    pub fn size(&self) -> usize {
+        self.data.capacity() * size_of::<f32>()
+    }
+
+    /// Row `y`'s plane of coordinate `c`.
+    #[inline(always)]
+    pub fn row(&self, frame: &Frame, c: usize, y: usize) -> &[f32] {
+        let start = (frame.place(y) * 3 + c) * frame.stride;
+        &self.data[start..start + frame.stride]
+    }
+
+    /// Row `y`'s planes.
+    #[inline(always)]
+    pub fn rows(&self, frame: &Frame, y: usize) -> [&[f32]; 3] {
+        [self.row(frame, 0, y), self.row(frame, 1, y), self.row(frame, 2, y)]
+    }
+
+    /// Reads row `y` of the points.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn push<S: Simd>(
+        &mut self,
+        points: &Points,
+        frame: &Frame,
+        y: usize,
+        limit: f32,
+        whole_points: bool,
+    ) -> RowNews {
+        let start = frame.place(y) * 3 * frame.stride;
+        let row = &mut self.data[start..start + 3 * frame.stride];
+        points.read_row(y, frame.columns.clone(), frame.stride, &mut row[MARGIN..], whole_points);
+        let xs = row[MARGIN..].as_mut_ptr();
+        // SAFETY: as the caller's; the groups lie inside the planes.
+        unsafe {
+            let (ys, zs) = (xs.add(frame.stride), xs.add(2 * frame.stride));
+            let mut hidden = S::splat(0.0);
+            let mut largest = S::splat(0.0);
+            for group in 0..frame.groups() {
+                let at = group * GROUP;
+                let (x, y, z) = (S::load(xs.add(at)), S::load(ys.add(at)), S::load(zs.add(at)));
+                let finite_z = S::finite(z);
+                let finite = S::and(finite_z, S::and(S::finite(x), S::finite(y)));
+                hidden = S::or(hidden, S::and_not(finite, finite_z));
+                let (x, y, z) = (S::and(finite, x), S::and(finite, y), S::and(finite, z));
+                largest = S::max(largest, S::max(S::abs(x), S::abs(y)));
+                S::store(xs.add(at), x);
+                S::store(ys.add(at), y);
+                S::store(zs.add(at), z);
+            }
+            RowNews {
+                hidden: S::bits(hidden) != 0,
+                beyond: S::bits(S::lt(S::splat(limit), largest)) != 0,
+            }
+        }
+    }
+}

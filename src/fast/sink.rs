@@ -1,0 +1,93 @@
+//! Where a tile's normals go: to every pixel, or to the places of the pixels that indices list.
+
+use super::tile::Octet;
+use crate::cloud::Normals;
+use crate::simd::GROUP;
+
+/// The output of one computation.
+pub(crate) enum Sink<'a> {
+    /// Pixel (x, y) of the normals.
+    All(&'a Normals<'a>),
+    /// The elements that belong to a pixel; several may.
+    Listed {
+        normals: &'a Normals<'a>,
+        /// (pixel, element), in the order of pixels.
+        listed: &'a [(u32, u32)],
+        width: usize,
+    },
+}
+
+impl Sink<'_> {
+    /// The listed pixels among `count` from `(x, y)` on, with their elements.
+    fn listed(&self, x: usize, y: usize, count: usize) -> &[(u32, u32)] {
+        match self {
+            Sink::All(_) => &[],
+            Sink::Listed { listed, width, .. } => {
+                let first = y * width + x;
+                let start = listed.partition_point(|(pixel, _)| (*pixel as usize) < first);
+                let rest = &listed[start..];
+                let end = rest.partition_point(|(pixel, _)| (*pixel as usize) < first + count);
+                &rest[..end]
+            }
+        }
+    }
+
+    /// Writes the first `count` of eight normals, for the pixels from `(x, y)` on. Without `curvature` all of them are
+    /// known to be NaN.
+    ///
+    /// # Safety
+    /// The pixels are inside the image, and no other thread writes them.
+    #[inline(always)]
+    pub unsafe fn write(&self, x: usize, y: usize, count: usize, octet: &Octet, curvature: bool) {
+        let normal = |lane: usize| octet.normal.map(|c| c[lane]);
+        match self {
+            // SAFETY: as the caller's.
+            Sink::All(normals) => unsafe {
+                if count == GROUP {
+                    let curvature = if curvature { &octet.curvature } else { &[f32::NAN; GROUP] };
+                    normals.write_group(x, y, &octet.normal, curvature);
+                } else {
+                    for lane in 0..count {
+                        normals.write(x + lane, y, normal(lane), octet.curvature[lane]);
+                    }
+                }
+            },
+            Sink::Listed { normals, width, .. } => {
+                for (pixel, element) in self.listed(x, y, count) {
+                    let lane = *pixel as usize - (y * width + x);
+                    // SAFETY: as the caller's; every listed element is one of the normals.
+                    unsafe {
+                        normals.write(*element as usize, 0, normal(lane), octet.curvature[lane])
+                    };
+                }
+            }
+        }
+    }
+
+    /// Writes NaN to `count` pixels from `(x, y)` on.
+    ///
+    /// # Safety
+    /// As [`Sink::write`].
+    #[inline(always)]
+    pub unsafe fn write_none(&self, x: usize, y: usize, count: usize) {
+        let none = [f32::NAN; 3];
+        match self {
+            // SAFETY: as the caller's.
+            Sink::All(normals) => unsafe {
+                if count == GROUP {
+                    normals.write_group(x, y, &[[f32::NAN; GROUP]; 3], &[f32::NAN; GROUP]);
+                } else {
+                    for lane in 0..count {
+                        normals.write(x + lane, y, none, f32::NAN);
+                    }
+                }
+            },
+            Sink::Listed { normals, .. } => {
+                for (_, element) in self.listed(x, y, count) {
+                    // SAFETY: as the caller's; every listed element is one of the normals.
+                    unsafe { normals.write(*element as usize, 0, none, f32::NAN) };
+                }
+            }
+        }
+    }
+}

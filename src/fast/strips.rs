@@ -1,0 +1,278 @@
+//! Sums of strips, for the two gradient methods.
+//!
+//! Over a whole window the sum of P(x+1) - P(x-1) telescopes to the window's last two columns (and the one after)
+//! minus its first (and the one before); so two prefix sums, down the columns and along the rows, give both gradients.
+//! Coordinates are integers here, multiples of a power of two: their sums are exact whatever wraps around between,
+//! as long as the differences fit, and the limit on the coordinates sees to that.
+
+use super::arithmetic::{Floats, cross, dot};
+use super::planes::{Frame, MARGIN, Planes, grow};
+use super::tile::{Found, Sums};
+use crate::simd::twice::Twice;
+use crate::simd::{GROUP, Simd};
+use crate::window::Image;
+
+/// The rings of AVERAGE_3D_GRADIENT (`SIMPLE` false), whose strips are pairs of columns and of rows, or of
+/// SIMPLE_3D_GRADIENT, whose strips are single ones.
+#[derive(Debug, Default)]
+pub(crate) struct Strips<const SIMPLE: bool> {
+    /// Per row, 3 planes each: sums down the columns, and along the rows.
+    columns: Vec<i32>,
+    rows: Vec<i32>,
+    /// The row pushed last and the one before it, as integers.
+    last: Vec<i32>,
+    above: Vec<i32>,
+    scale: f32,
+    started: bool,
+}
+
+/// Horizontal and vertical gradient.
+type Gradients<T> = [[T; 3]; 2];
+
+/// Rounding to integers moves a sum of 4 `side` coordinates by about sqrt(side). A normal is doubtful where that could
+/// turn it by more than 1e-4, or where floats could: (sine of the angle between the tangents) < 1e-3.
+const DOUBT_ROUNDING: f32 = 4e8;
+const DOUBT_SINE: f32 = 1e-6;
+
+impl<const SIMPLE: bool> Strips<SIMPLE> {
+    /// Where row `y` starts in a ring; the planes of its coordinates are a stride apart.
+    #[inline(always)]
+    fn start_of(frame: &Frame, y: usize) -> usize {
+        frame.place(y) * 3 * frame.stride
+    }
+
+    /// The sum between two columns' strips and between two rows' strips: first and last row that the column strips
+    /// span (the first exclusive), the two columns; the same for the rows.
+    #[inline(always)]
+    fn places(x: usize, y: usize, side: usize) -> [[usize; 4]; 2] {
+        let half = side / 2;
+        let (x0, y0) = (x.wrapping_sub(half), y - half);
+        let far = if SIMPLE { half + half } else { side };
+        [
+            [y0 - 1, y0 + side - 1, x0, x0.wrapping_add(far)],
+            [x0.wrapping_sub(1), x0.wrapping_add(side - 1), y0, y0 + far],
+        ]
+    }
+}
+
+impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
+    type Of8<S: Simd> = Gradients<S::I>;
+    type Of1 = Gradients<i32>;
+
+    const COLUMN: usize = 6 * size_of::<i32>();
+    const CURVATURE: bool = false;
+
+    fn start(&mut self, frame: &Frame, limit: f32, side: usize, _origin: [f32; 3]) {
+        for ring in [&mut self.columns, &mut self.rows] {
+            grow(ring, 3 * frame.ring * frame.stride);
+        }
+        for row in [&mut self.last, &mut self.above] {
+            grow(row, 3 * frame.stride);
+        }
+        // 4 side limit scale < 2^31, and a power of two.
+        let bits = 29.0 - (f64::from(limit) * side as f64).log2();
+        self.scale = bits.floor().clamp(-120.0, 120.0).exp2() as f32;
+        self.started = false;
+    }
+
+    fn size(&self) -> usize {
+        let Strips { columns, rows, last, above, .. } = self;
+        [columns, rows, last, above].iter().map(|b| b.capacity() * size_of::<i32>()).sum()
+    }
+
+    #[inline(always)]
+    unsafe fn push<S: Simd>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
+        std::mem::swap(&mut self.last, &mut self.above);
+        let groups = frame.groups() + 1; // the strips' groups may reach one further
+        for c in 0..3 {
+            let start = c * frame.stride;
+            let own = Self::start_of(frame, y) + start;
+            let above = if self.started { Self::start_of(frame, y - 1) + start } else { own };
+            let from = planes.row(frame, c, y).as_ptr();
+            let last = &mut self.last[start..start + frame.stride];
+            let pair = &self.above[start..start + frame.stride];
+            let rows = &mut self.rows[own..own + frame.stride];
+            assert!(
+                MARGIN + groups * GROUP <= frame.stride && own + frame.stride <= self.columns.len()
+            );
+            // SAFETY: as the caller's; the groups lie inside the rows, whose lengths were just checked.
+            unsafe {
+                let scale = S::splat(self.scale);
+                let mut carry = S::splat_i(0);
+                for group in 0..groups {
+                    let at = MARGIN + group * GROUP;
+                    let point = S::round_i(S::mul(S::load(from.add(at)), scale));
+                    S::store_i(last.as_mut_ptr().add(at), point);
+                    let strip = if SIMPLE || !self.started {
+                        point
+                    } else {
+                        S::add_i(point, S::load_i(pair.as_ptr().add(at)))
+                    };
+                    let sum = S::add_i(S::prefix_sum_i(strip), carry);
+                    S::store_i(rows.as_mut_ptr().add(at), sum);
+                    carry = S::last_i(sum);
+                }
+                let columns = self.columns.as_mut_ptr();
+                for group in 0..groups {
+                    let at = MARGIN + group * GROUP;
+                    let mut strip = S::load_i(last.as_ptr().add(at));
+                    if !SIMPLE {
+                        strip = S::add_i(strip, S::load_i(last.as_ptr().add(at - 1)));
+                    }
+                    if self.started {
+                        strip = S::add_i(strip, S::load_i(columns.add(above + at)));
+                    }
+                    S::store_i(columns.add(own + at), strip);
+                }
+            }
+        }
+        self.started = true;
+    }
+
+    #[inline(always)]
+    unsafe fn of_group<S: Simd>(
+        &self,
+        frame: &Frame,
+        _planes: &Planes,
+        x: usize,
+        y: usize,
+        side: usize,
+    ) -> Self::Of8<S> {
+        let [[top, bottom, left, right], [before, end, upper, lower]] = Self::places(x, y, side);
+        // SAFETY: as the caller's: rows and columns are held, and so are the groups from these columns on.
+        unsafe {
+            let columns = self.columns.as_ptr();
+            let (top, bottom) = (Self::start_of(frame, top), Self::start_of(frame, bottom));
+            let (top, bottom) = (columns.add(top), columns.add(bottom));
+            let (left, right) = (frame.column(left), frame.column(right));
+            let rows = self.rows.as_ptr();
+            let (upper, lower) = (Self::start_of(frame, upper), Self::start_of(frame, lower));
+            let (upper, lower) = (rows.add(upper), rows.add(lower));
+            let (before, end) = (frame.column(before), frame.column(end));
+            let mut sums = Self::none::<S>();
+            for c in 0..3 {
+                let plane = c * frame.stride;
+                sums[0][c] = difference::<S>([top, bottom], [plane + left, plane + right]);
+                sums[1][c] = difference::<S>([upper, lower], [plane + before, plane + end]);
+            }
+            sums
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn select<S: Simd>(lanes: u32, yes: Self::Of8<S>, no: Self::Of8<S>) -> Self::Of8<S> {
+        let mut sums = no;
+        for g in 0..2 {
+            for c in 0..3 {
+                // SAFETY: as the caller's.
+                sums[g][c] = unsafe { S::select_i(lanes, yes[g][c], no[g][c]) };
+            }
+        }
+        sums
+    }
+
+    #[inline(always)]
+    fn pair<S: Simd>(first: Self::Of8<S>, second: Self::Of8<S>) -> Self::Of8<Twice<S>> {
+        let [[a, b, c], [d, e, f]] = first;
+        let [[g, h, i], [j, k, l]] = second;
+        [[[a, g], [b, h], [c, i]], [[d, j], [e, k], [f, l]]]
+    }
+
+    #[inline(always)]
+    unsafe fn none<S: Simd>() -> Self::Of8<S> {
+        // SAFETY: as the caller's.
+        [[unsafe { S::splat_i(0) }; 3]; 2]
+    }
+
+    fn of_mirrored(
+        &self,
+        frame: &Frame,
+        _planes: &Planes,
+        image: &Image,
+        (x, y): (usize, usize),
+        side: usize,
+    ) -> Option<Self::Of1> {
+        if SIMPLE {
+            return None; // never mirrored
+        }
+        let half = (side / 2) as isize;
+        let mut sums = [[0_i32; 3]; 2];
+        for rect in image.rects((x as isize - half, y as isize - half), (side, side)) {
+            let inside = rect.inside_frame(image);
+            if inside.x.is_empty() || inside.y.is_empty() {
+                continue;
+            }
+            let (x0, x1) = (inside.x.start, inside.x.end);
+            let (y0, y1) = (inside.y.start, inside.y.end);
+            for c in 0..3 {
+                let column = |y, x| {
+                    self.columns[Self::start_of(frame, y) + c * frame.stride + frame.column(x)]
+                };
+                let row =
+                    |y, x| self.rows[Self::start_of(frame, y) + c * frame.stride + frame.column(x)];
+                let strip = |x| column(y1 - 1, x).wrapping_sub(column(y0 - 1, x));
+                let segment = |y| row(y, x1 - 1).wrapping_sub(row(y, x0 - 1));
+                sums[0][c] = sums[0][c].wrapping_add(strip(x1).wrapping_sub(strip(x0)));
+                sums[1][c] = sums[1][c].wrapping_add(segment(y1).wrapping_sub(segment(y0)));
+            }
+        }
+        Some(sums)
+    }
+
+    #[inline(always)]
+    unsafe fn put<S: Simd>(sums: &mut Self::Of8<S>, lane: usize, one: Self::Of1) {
+        for g in 0..2 {
+            for c in 0..3 {
+                // SAFETY: as the caller's.
+                sums[g][c] = unsafe { S::select_i(1 << lane, S::splat_i(one[g][c]), sums[g][c]) };
+            }
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn estimate<S: Simd>(
+        &self,
+        _frame: &Frame,
+        sums: &Self::Of8<S>,
+        sides: S::F,
+        _lanes: u32,
+    ) -> Found<S> {
+        // SAFETY: as the caller's.
+        unsafe {
+            let [h, v] = [float::<S>(sums[0]), float::<S>(sums[1])];
+            let n = cross(v, h);
+            let (n2, h2, v2) = (dot(n, n), dot(h, h), dot(v, v));
+            let rounding = Floats(sides) * Floats::splat(DOUBT_ROUNDING) * (h2 + v2);
+            let sine = h2 * v2 * Floats::splat(DOUBT_SINE);
+            let scale = Floats::splat(1.0) / n2.sqrt();
+            Found {
+                normal: [n[0] * scale, n[1] * scale, n[2] * scale],
+                curvature: Floats::splat(f32::NAN),
+                doubtful: !rounding.max(sine).lt(n2),
+            }
+        }
+    }
+}
+
+/// Of a ring, the difference between two columns' differences between two rows.
+///
+/// # Safety
+/// The processor has the instruction set of `S`, and the groups are inside the ring.
+#[inline(always)]
+unsafe fn difference<S: Simd>(rows: [*const i32; 2], columns: [usize; 2]) -> S::I {
+    // SAFETY: as the caller's.
+    unsafe {
+        let at = |row: usize, column: usize| rows[row].add(columns[column]);
+        let lower = S::sub_i(S::load_i(at(1, 1)), S::load_i(at(1, 0)));
+        let upper = S::sub_i(S::load_i(at(0, 1)), S::load_i(at(0, 0)));
+        S::sub_i(lower, upper)
+    }
+}
+
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn float<S: Simd>(v: [S::I; 3]) -> [Floats<S>; 3] {
+    // SAFETY: as the caller's.
+    unsafe { [Floats(S::float_i(v[0])), Floats(S::float_i(v[1])), Floats(S::float_i(v[2]))] }
+}

@@ -1,0 +1,542 @@
+//! Steps 4 and 5, fast, for one tile of the image: rows of points go through rings of sums, and every group of
+//! eight pixels takes its windows' sums from them.
+
+use std::ops::Range;
+
+use super::arithmetic::{Floats, dot};
+use super::planes::{Frame, MARGIN, Planes};
+use super::sink::Sink;
+use crate::cloud::Points;
+use crate::methods::{Estimate, estimate};
+use crate::options::{BorderPolicy, Options};
+use crate::orientation::turn_to_viewpoint;
+use crate::simd::twice::Twice;
+use crate::simd::{GROUP, Simd};
+use crate::window::Image;
+
+/// What a method finds for eight pixels: normals of unit length, not yet turned, and curvatures.
+pub(crate) struct Found<S: Simd> {
+    pub normal: [Floats<S>; 3],
+    pub curvature: Floats<S>,
+    /// The lanes whose sums are too near to the rounding of the rings: the plain form decides.
+    pub doubtful: u32,
+}
+
+/// A method's sums over windows, from rings of integral rows. Each method says what it keeps a ring of.
+pub(crate) trait Sums {
+    /// The sums of eight windows.
+    type Of8<S: Simd>: Copy;
+    /// The sums of one window.
+    type Of1;
+
+    /// Bytes a column of a ring's row takes.
+    const COLUMN: usize;
+
+    /// Whether the method gives a curvature.
+    const CURVATURE: bool;
+
+    /// Makes room, and forgets the rows pushed before. `limit` bounds the coordinates, `side` the windows.
+    fn start(&mut self, frame: &Frame, limit: f32, side: usize, origin: [f32; 3]);
+
+    /// Bytes held.
+    fn size(&self) -> usize;
+
+    /// Adds row `y` of the planes; rows come in order.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    unsafe fn push<S: Simd>(&mut self, frame: &Frame, planes: &Planes, y: usize);
+
+    /// The sums of the windows of `side` x `side` around the eight pixels from `(x, y)` on. The windows, and the
+    /// pixels around them, lie inside the image and hold finite points only.
+    ///
+    /// # Safety
+    /// As [`Sums::push`]; the rings hold the rows and columns of the windows.
+    unsafe fn of_group<S: Simd>(
+        &self,
+        frame: &Frame,
+        planes: &Planes,
+        x: usize,
+        y: usize,
+        side: usize,
+    ) -> Self::Of8<S>;
+
+    /// `mask ? yes : no`
+    ///
+    /// # Safety
+    /// As [`Sums::push`].
+    unsafe fn select<S: Simd>(lanes: u32, yes: Self::Of8<S>, no: Self::Of8<S>) -> Self::Of8<S>;
+
+    /// The sums of one window that crosses the border of the image and is mirrored there; none if this method
+    /// leaves such windows to the plain form.
+    fn of_mirrored(
+        &self,
+        frame: &Frame,
+        planes: &Planes,
+        image: &Image,
+        pixel: (usize, usize),
+        side: usize,
+    ) -> Option<Self::Of1>;
+
+    /// Two groups' sums.
+    fn pair<S: Simd>(first: Self::Of8<S>, second: Self::Of8<S>) -> Self::Of8<Twice<S>>;
+
+    /// Sums to put lanes into.
+    ///
+    /// # Safety
+    /// As [`Sums::push`].
+    unsafe fn none<S: Simd>() -> Self::Of8<S>;
+
+    /// Replaces one lane.
+    ///
+    /// # Safety
+    /// As [`Sums::push`].
+    unsafe fn put<S: Simd>(sums: &mut Self::Of8<S>, lane: usize, one: Self::Of1);
+
+    /// The estimates from the sums; `sides` are the sides of the windows. Only these `lanes` have sums: the others
+    /// hold anything, and may not have a say in these lanes' estimates.
+    ///
+    /// # Safety
+    /// As [`Sums::push`].
+    unsafe fn estimate<S: Simd>(
+        &self,
+        frame: &Frame,
+        sums: &Self::Of8<S>,
+        sides: S::F,
+        lanes: u32,
+    ) -> Found<S>;
+}
+
+/// What a tile is computed from.
+pub(crate) struct Tile<'a> {
+    pub points: &'a Points<'a>,
+    pub options: &'a Options,
+    pub image: &'a Image,
+    /// The pixels to compute; the first column is a multiple of the group.
+    pub columns: Range<usize>,
+    pub rows: Range<usize>,
+    /// No coordinate's magnitude is larger.
+    pub limit: f32,
+    pub whole_points: bool,
+}
+
+/// A coordinate was beyond the tile's limit; what was written must be computed again with a larger one.
+pub(crate) struct BeyondLimit;
+
+impl Tile<'_> {
+    /// Computes the tile's normals. `sides` gives a row's sides of windows, readable up to a whole group.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`; the sink's pixels of this tile are written by no one else.
+    #[inline(always)]
+    pub unsafe fn compute<'r, S: Simd, M: Sums>(
+        &self,
+        frame: &mut Frame,
+        planes: &mut Planes,
+        sums: &mut M,
+        sides: &impl Fn(usize) -> &'r [f32],
+        sink: &Sink,
+    ) -> Result<(), BeyondLimit> {
+        // SAFETY: as the caller's.
+        let side = unsafe { self.largest_side::<S>(sides) };
+        if side == 0 {
+            for y in self.rows.clone() {
+                for x in self.columns.clone().step_by(GROUP) {
+                    // SAFETY: as the caller's.
+                    unsafe { sink.write_none(x, y, (self.columns.end - x).min(GROUP)) };
+                }
+            }
+            return Ok(());
+        }
+        let (before, after) = (side / 2 + 1, side.div_ceil(2));
+        let left = self.columns.start.saturating_sub(before) / GROUP * GROUP;
+        let right = (self.columns.end + after + 1).min(self.image.width);
+        let top = self.rows.start.saturating_sub(before);
+        let bottom = (self.rows.end + after).min(self.image.height);
+        frame.set(left..right, top..bottom, before + after + 1);
+        planes.resize(frame);
+        let origin = self.origin(sides);
+        sums.start(frame, self.limit, side, origin);
+
+        let mut next = top;
+        let mut hidden = false;
+        for y in self.rows.clone() {
+            while next < (y + after + 1).min(self.image.height) {
+                // SAFETY: as the caller's.
+                let news = unsafe {
+                    planes.push::<S>(self.points, frame, next, self.limit, self.whole_points)
+                };
+                if news.beyond {
+                    return Err(BeyondLimit);
+                }
+                hidden |= news.hidden;
+                // SAFETY: as the caller's.
+                unsafe { sums.push::<S>(frame, planes, next) };
+                next += 1;
+            }
+            // SAFETY: as the caller's.
+            unsafe { self.row::<S, M>(frame, planes, sums, sides, sink, y, hidden) };
+        }
+        Ok(())
+    }
+
+    /// The largest side of a window in the tile that fits the image.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn largest_side<'r, S: Simd>(&self, sides: &impl Fn(usize) -> &'r [f32]) -> usize {
+        // SAFETY: as the caller's; a row of sides is readable up to a whole group, and other pixels' sides do no harm.
+        unsafe {
+            let mut largest = S::splat(0.0);
+            for y in self.rows.clone() {
+                let row = sides(y).as_ptr();
+                let inside = self.columns.end - self.columns.len() % GROUP;
+                for x in (self.columns.start..inside).step_by(GROUP) {
+                    largest = S::max(largest, S::load(row.add(x)));
+                }
+                for x in inside..self.columns.end {
+                    largest = S::max(largest, S::splat(*row.add(x)));
+                }
+            }
+            let mut lanes = [0.0; GROUP];
+            S::store(lanes.as_mut_ptr(), largest);
+            let largest = lanes.into_iter().fold(0.0, f32::max) as usize;
+            largest.min(self.image.width.min(self.image.height))
+        }
+    }
+
+    /// A finite point in the tile: sums about it lose less.
+    fn origin<'r>(&self, sides: &impl Fn(usize) -> &'r [f32]) -> [f32; 3] {
+        for y in self.rows.clone() {
+            let row = &sides(y)[self.columns.clone()];
+            if let Some(at) = row.iter().position(|side| *side > 0.0) {
+                let point = self.points.at(self.columns.start + at, y);
+                return point.map(|c| if c.is_finite() { c } else { 0.0 });
+            }
+        }
+        [0.0; 3]
+    }
+
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    unsafe fn row<'r, S: Simd, M: Sums>(
+        &self,
+        frame: &Frame,
+        planes: &Planes,
+        sums: &M,
+        sides: &impl Fn(usize) -> &'r [f32],
+        sink: &Sink,
+        y: usize,
+        hidden: bool,
+    ) {
+        let row = sides(y);
+        let planes_row = planes.rows(frame, y);
+        let viewpoint = self.options.viewpoint;
+        let mut x = self.columns.start;
+        while x < self.columns.end {
+            // SAFETY: as the caller's; a row of sides is readable up to a whole pair of groups.
+            unsafe {
+                let pair = [Group::<S>::new(self, row, x, y), Group::new(self, row, x + GROUP, y)];
+                x += 2 * GROUP;
+                let windows = pair[0].windows | pair[1].windows << GROUP;
+                if windows == 0 || hidden {
+                    for group in &pair {
+                        self.without_sums(sink, group);
+                    }
+                    continue;
+                }
+                let first = self.group::<S, M>(frame, planes, sums, sides, &pair[0]);
+                let second = self.group::<S, M>(frame, planes, sums, sides, &pair[1]);
+                let group_sides = [pair[0].sides, pair[1].sides];
+                let of16 = M::pair::<S>(first.0, second.0);
+                let left = first.1 | second.1 << GROUP;
+                let found = sums.estimate::<Twice<S>>(frame, &of16, group_sides, windows & !left);
+                let plain = left | found.doubtful & windows;
+                for g in 0..2 {
+                    let group = &pair[g];
+                    let plain = plain >> (g * GROUP) & 0xff;
+                    if group.windows == 0 {
+                        sink.write_none(group.x, y, group.count);
+                        continue;
+                    }
+                    let column = frame.column(group.x);
+                    let point = [
+                        Floats(S::load(planes_row[0].as_ptr().add(column))),
+                        Floats(S::load(planes_row[1].as_ptr().add(column))),
+                        Floats(S::load(planes_row[2].as_ptr().add(column))),
+                    ];
+                    let normal = [
+                        Floats(found.normal[0].0[g]),
+                        Floats(found.normal[1].0[g]),
+                        Floats(found.normal[2].0[g]),
+                    ];
+                    let curvature = Floats(found.curvature.0[g]);
+                    let sure = group.windows & !plain;
+                    let mut normals = Octet::of::<S>(normal, curvature, point, viewpoint, sure);
+                    if plain != 0 {
+                        self.plain_lanes(&mut normals, group, plain);
+                    }
+                    sink.write(group.x, y, group.count, &normals, M::CURVATURE);
+                }
+            }
+        }
+    }
+
+    /// A group that needs no sums: without windows, or whose windows are all left to the plain form.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn without_sums<S: Simd>(&self, sink: &Sink, group: &Group<S>) {
+        // SAFETY: as the caller's.
+        unsafe {
+            if group.windows == 0 {
+                sink.write_none(group.x, group.y, group.count);
+                return;
+            }
+            let mut normals = Octet::none();
+            self.plain_lanes(&mut normals, group, group.windows);
+            sink.write(group.x, group.y, group.count, &normals, true);
+        }
+    }
+
+    /// The normals of some of a group's lanes by the plain form.
+    #[cold]
+    fn plain_lanes<S: Simd>(&self, normals: &mut Octet, group: &Group<S>, lanes: u32) {
+        for lane in Bits(lanes) {
+            let pixel = (group.x + lane, group.y);
+            let side = group.row[pixel.0] as usize;
+            let found = estimate(self.options.method, self.points, self.image, pixel, side);
+            let point = self.points.at(pixel.0, pixel.1);
+            let normal = turn_to_viewpoint(found.normal, point, self.options.viewpoint);
+            normals.put(lane, Estimate { normal, ..found });
+        }
+    }
+
+    /// The sums of a group's windows, and the lanes whose windows are left to the plain form.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn group<'r, S: Simd, M: Sums>(
+        &self,
+        frame: &Frame,
+        planes: &Planes,
+        sums: &M,
+        sides: &impl Fn(usize) -> &'r [f32],
+        group: &Group<S>,
+    ) -> (M::Of8<S>, u32) {
+        let (mut plain, mut todo) = (0, group.windows);
+        // SAFETY: as the caller's; the frame holds the largest side around every pixel of the tile.
+        unsafe {
+            if todo == 0 {
+                return (M::none::<S>(), 0);
+            }
+            let (same, side) = group.next_windows(todo);
+            todo &= !same;
+            let mut of8 = if self.is_inside(group, same, side) {
+                sums.of_group::<S>(frame, planes, group.x, group.y, side)
+            } else {
+                let mut of8 = M::none::<S>();
+                plain |=
+                    self.crossing::<S, M>(frame, planes, sums, sides, group, same, side, &mut of8);
+                of8
+            };
+            while todo != 0 {
+                let (same, side) = group.next_windows(todo);
+                todo &= !same;
+                if self.is_inside(group, same, side) {
+                    let these = sums.of_group::<S>(frame, planes, group.x, group.y, side);
+                    of8 = M::select::<S>(same, these, of8);
+                } else {
+                    plain |= self
+                        .crossing::<S, M>(frame, planes, sums, sides, group, same, side, &mut of8);
+                }
+            }
+            (of8, plain)
+        }
+    }
+
+    /// Whether the windows of some lanes, and the pixels around them, are inside the image.
+    #[inline(always)]
+    fn is_inside<S: Simd>(&self, group: &Group<S>, lanes: u32, side: usize) -> bool {
+        let Image { width, height, .. } = *self.image;
+        let first = lanes.trailing_zeros() as usize;
+        let last = (u32::BITS - 1 - lanes.leading_zeros()) as usize;
+        // AVERAGE_DEPTH_CHANGE reaches one pixel further than the window.
+        let (half, rest) = (side / 2, side / 2 + 1);
+        group.x + first > half
+            && group.x + last + rest < width
+            && group.y > half
+            && group.y + rest < height
+    }
+
+    /// Puts the sums of windows that cross the border of the image; returns the lanes left to the plain form.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[cold]
+    #[allow(clippy::too_many_arguments)]
+    unsafe fn crossing<'r, S: Simd, M: Sums>(
+        &self,
+        frame: &Frame,
+        planes: &Planes,
+        sums: &M,
+        sides: &impl Fn(usize) -> &'r [f32],
+        group: &Group<S>,
+        lanes: u32,
+        side: usize,
+        of8: &mut M::Of8<S>,
+    ) -> u32 {
+        let mut plain = 0;
+        for lane in Bits(lanes) {
+            let pixel = (group.x + lane, group.y);
+            let one = if self.has_only_finite(pixel, side, sides) {
+                sums.of_mirrored(frame, planes, self.image, pixel, side)
+            } else {
+                None
+            };
+            match one {
+                // SAFETY: as the caller's.
+                Some(one) => unsafe { M::put::<S>(of8, lane, one) },
+                None => plain |= 1 << lane,
+            }
+        }
+        plain
+    }
+
+    /// Whether a mirrored window certainly holds finite points only.
+    ///
+    /// Distances are too large in the image's outermost rows and columns, where only one of the passes works;
+    /// there, the next pixel inwards must have as large a window.
+    fn has_only_finite<'r>(
+        &self,
+        (x, y): (usize, usize),
+        side: usize,
+        sides: &impl Fn(usize) -> &'r [f32],
+    ) -> bool {
+        let Image { width, height, border_policy } = *self.image;
+        if border_policy != BorderPolicy::Mirror || side > width.min(height) {
+            return false;
+        }
+        let inner = (x.clamp(1, width - 2), y.clamp(1, height - 2));
+        inner == (x, y) || sides(inner.1)[inner.0] as usize >= side
+    }
+}
+
+/// Eight pixels of a row and their windows.
+struct Group<'a, S: Simd> {
+    /// The first pixel.
+    x: usize,
+    y: usize,
+    /// The row's sides of windows, and the eight pixels'.
+    row: &'a [f32],
+    sides: S::F,
+    /// Its pixels in the tile; none for the half of a pair that lies behind the tile.
+    count: usize,
+    /// The lanes that have a window.
+    windows: u32,
+}
+
+impl<'a, S: Simd> Group<'a, S> {
+    /// # Safety
+    /// The processor has the instruction set of `S`; the row is readable from `x` up to a whole group.
+    #[inline(always)]
+    unsafe fn new(tile: &Tile, row: &'a [f32], x: usize, y: usize) -> Self {
+        let count = tile.columns.end.saturating_sub(x).min(GROUP);
+        // SAFETY: as the caller's.
+        unsafe {
+            let sides = S::load(row.as_ptr().add(x));
+            let windows = S::bits(S::lt(S::splat(0.0), sides)) & ((1 << count) - 1);
+            Group { x, y, row, sides, count, windows }
+        }
+    }
+
+    /// The first of the lanes `todo` and those with windows of the same side; and that side.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn next_windows(&self, todo: u32) -> (u32, usize) {
+        let side = self.row[self.x + todo.trailing_zeros() as usize];
+        // SAFETY: as the caller's; sides are whole numbers that fit i32.
+        unsafe {
+            let same = S::bits(S::eq(self.sides, S::splat(side))) & todo;
+            (same, side.to_int_unchecked::<i32>() as usize)
+        }
+    }
+}
+
+/// The set bits of a mask, lowest first.
+struct Bits(u32);
+
+impl Iterator for Bits {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        let first = self.0.trailing_zeros() as usize;
+        self.0 &= self.0.wrapping_sub(1);
+        (first < 32).then_some(first)
+    }
+}
+
+/// Eight normals and curvatures.
+#[repr(C, align(32))]
+pub(crate) struct Octet {
+    pub normal: [[f32; GROUP]; 3],
+    pub curvature: [f32; GROUP],
+}
+
+impl Octet {
+    #[inline(always)]
+    fn none() -> Self {
+        Octet { normal: [[f32::NAN; GROUP]; 3], curvature: [f32::NAN; GROUP] }
+    }
+
+    #[inline(always)]
+    fn put(&mut self, lane: usize, estimate: Estimate) {
+        for (to, from) in self.normal.iter_mut().zip(estimate.normal) {
+            to[lane] = from;
+        }
+        self.curvature[lane] = estimate.curvature;
+    }
+
+    /// What was found for `lanes`, turned to the viewpoint: `orientation::turn_to_viewpoint`.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn of<S: Simd>(
+        normal: [Floats<S>; 3],
+        curvature: Floats<S>,
+        point: [Floats<S>; 3],
+        viewpoint: [f32; 3],
+        lanes: u32,
+    ) -> Self {
+        // SAFETY: as the caller's; the arrays hold a group each.
+        unsafe {
+            let [x, y, z] = viewpoint;
+            let viewpoint = [Floats::<S>::splat(x), Floats::splat(y), Floats::splat(z)];
+            let [x, y, z] = point;
+            let to_viewpoint = [viewpoint[0] - x, viewpoint[1] - y, viewpoint[2] - z];
+            let cosine = dot(to_viewpoint, normal);
+            let flip = S::and(S::lt(cosine.0, S::splat(0.0)), S::splat(-0.0));
+            let mask = S::mask(lanes);
+            let none = S::splat(f32::NAN);
+            let mut octet = std::mem::MaybeUninit::<Octet>::uninit();
+            let to = octet.as_mut_ptr().cast::<f32>();
+            for c in 0..3 {
+                let normal = S::select(mask, S::xor(normal[c].0, flip), none);
+                S::store(to.add(c * GROUP), normal);
+            }
+            S::store(to.add(3 * GROUP), S::select(mask, curvature.0, none));
+            octet.assume_init()
+        }
+    }
+}
+
+const _: () = assert!(MARGIN >= GROUP);

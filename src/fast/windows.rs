@@ -1,0 +1,543 @@
+//! Steps 1 to 3, fast: depth changes and the forward chamfer pass in one sweep down the rows, the backward pass and
+//! the sides of the windows in one sweep up. The plain forms are in `depth_change`, `distance`, `smoothing_area`.
+
+use std::ops::Range;
+
+use super::lanes::{LANES, LaneOrder, Lanes};
+use crate::cloud::Points;
+use crate::distance::{DIAGONAL, STRAIGHT, far};
+use crate::options::Options;
+use crate::simd::Simd;
+use crate::smoothing_area::{LARGEST, SMALLEST};
+
+/// Rows of a map in lane order, each between two elements that hold the neighbouring segments' ends. After the
+/// upward sweep the rows hold the sides of windows instead, pixel by pixel.
+pub(crate) struct WindowRows<'a> {
+    order: LaneOrder,
+    rows: &'a mut [Lanes],
+}
+
+/// What the sweeps need beside the map.
+#[derive(Debug, Default)]
+pub(crate) struct Sweep {
+    /// Rows of depths in lane order, each with an element more for the following segments' first pixels: all that are
+    /// swept if the upward sweep needs them again, else a ring of two.
+    z: Vec<Lanes>,
+    /// Rows in `z`, and the image's row that is the first in it.
+    z_rows: usize,
+    z_first: usize,
+    /// Masks: where the pixel has a right neighbour, and where there is a depth change from the one above.
+    tested: Vec<Lanes>,
+    above: Vec<Lanes>,
+    sides: Vec<Lanes>,
+}
+
+impl Sweep {
+    fn resize(&mut self, order: LaneOrder, z_rows: usize, z_first: usize) {
+        (self.z_rows, self.z_first) = (z_rows, z_first);
+        let length = order.segment + 1;
+        let grow = |rows: &mut Vec<Lanes>, count: usize| {
+            if rows.len() < count {
+                rows.resize(count, Lanes::ZERO);
+            }
+        };
+        grow(&mut self.z, z_rows * length);
+        grow(&mut self.above, length);
+        grow(&mut self.sides, length);
+        self.above.fill(Lanes::ZERO);
+        self.tested.clear();
+        self.tested.resize(length, Lanes::ZERO);
+        for x in 0..order.width - 1 {
+            let (k, l) = order.place(x);
+            self.tested[k].0[l] = f32::from_bits(!0);
+        }
+    }
+
+    /// Where row `y` of the depths lies in `z`.
+    fn z_place(&self, order: LaneOrder, y: usize) -> Range<usize> {
+        let length = order.segment + 1;
+        let start = (y - self.z_first) % self.z_rows * length;
+        start..start + length
+    }
+
+    /// Reads a row's depths.
+    #[inline(always)]
+    fn read_z(&mut self, points: &Points, order: LaneOrder, y: usize) {
+        let place = self.z_place(order, y);
+        let z = &mut self.z[place];
+        let (row, stride) = points.z_row(y);
+        // SAFETY: row y is inside the cloud, so it has a depth at every x below the width.
+        unsafe { order.read(row, stride, z) };
+        z[order.segment] = z[0].previous_lane(0.0);
+    }
+
+    /// Bytes held.
+    pub fn size(&self) -> usize {
+        let Sweep { z, tested, above, sides, .. } = self;
+        [z, tested, above, sides].iter().map(|row| row.capacity() * size_of::<Lanes>()).sum()
+    }
+}
+
+/// Elements of a row of the map.
+pub(crate) fn row_length(width: usize) -> usize {
+    LaneOrder::new(width).segment + 2
+}
+
+impl<'a> WindowRows<'a> {
+    /// `rows` holds `row_length` elements for each of the rows that will be swept.
+    pub fn new(width: usize, rows: &'a mut [Lanes]) -> Self {
+        WindowRows { order: LaneOrder::new(width), rows }
+    }
+
+    #[inline(always)]
+    fn row(&mut self, index: usize) -> &mut [Lanes] {
+        let length = self.order.segment + 2;
+        &mut self.rows[index * length..(index + 1) * length]
+    }
+
+    /// Rows `index` and `index + 1`.
+    #[inline(always)]
+    fn two_rows(&mut self, index: usize) -> (&mut [Lanes], &mut [Lanes]) {
+        let length = self.order.segment + 2;
+        self.rows[index * length..(index + 2) * length].split_at_mut(length)
+    }
+
+    /// Depth changes and the forward pass over the image's rows `first..first + count`, downwards. Returns the largest
+    /// magnitude of a finite depth in them.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn sweep_down<S: Simd>(
+        &mut self,
+        points: &Points,
+        options: &Options,
+        (first, count): (usize, usize),
+        sweep: &mut Sweep,
+    ) -> f32 {
+        let order = self.order;
+        let z_rows = if options.depth_dependent_smoothing { count + 2 } else { 2 };
+        let before = first.saturating_sub(1);
+        sweep.resize(order, z_rows, before);
+        let factor = options.max_depth_change_factor;
+        let far = far(points.width(), points.height());
+        sweep.read_z(points, order, before);
+        let mut largest = Lanes::ZERO;
+        for y in before..first + count {
+            let last = y + 1 == points.height();
+            if !last {
+                sweep.read_z(points, order, y + 1);
+            }
+            // The row before the first is only tested against the first.
+            let index = (y + 1).saturating_sub(first + 1);
+            let row = &mut self.row(index)[1..];
+            // SAFETY: as the caller's.
+            unsafe {
+                if last {
+                    sweep.start_last_row::<S>(order, far, row);
+                } else {
+                    sweep.start_row::<S>(order, y, factor, far, row, &mut largest);
+                }
+                if y > first {
+                    let (above, row) = self.two_rows(index - 1);
+                    forward::<S>(order, above, row);
+                }
+            }
+            close_ends(self.row(index), far);
+        }
+        largest.0.into_iter().fold(0.0, f32::max)
+    }
+
+    /// The backward pass upwards over the swept rows, `first` being the image's row of the first; then the rows
+    /// hold the sides of their windows.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn sweep_up<S: Simd>(
+        &mut self,
+        points: &Points,
+        options: &Options,
+        (first, count): (usize, usize),
+        sweep: &mut Sweep,
+    ) {
+        let order = self.order;
+        let far = far(points.width(), points.height());
+        for index in (0..count).rev() {
+            if index + 1 < count {
+                let (row, below) = self.two_rows(index);
+                // SAFETY: as the caller's.
+                unsafe { backward::<S>(order, row, below, far) };
+                close_ends(row, far);
+                // SAFETY: as the caller's.
+                unsafe { sweep.sides::<S>(points, options, first + index + 1, order, below) };
+            }
+        }
+        // SAFETY: as the caller's.
+        unsafe { sweep.sides::<S>(points, options, first, order, self.row(0)) };
+    }
+}
+
+/// The sides of the windows of a row, after [`WindowRows::sweep_up`], and more that means nothing: the width rounded
+/// up to a multiple of 16, at least.
+pub(crate) fn sides(rows: &[Lanes], width: usize, index: usize) -> &[f32] {
+    let length = row_length(width);
+    floats(&rows[index * length..(index + 1) * length])
+}
+
+fn floats(row: &[Lanes]) -> &[f32] {
+    // SAFETY: Lanes are arrays of floats without padding.
+    unsafe { std::slice::from_raw_parts(row.as_ptr().cast(), row.len() * LANES) }
+}
+
+fn floats_mut(row: &mut [Lanes]) -> &mut [f32] {
+    // SAFETY: Lanes are arrays of floats without padding, and any float is valid in them.
+    unsafe { std::slice::from_raw_parts_mut(row.as_mut_ptr().cast(), row.len() * LANES) }
+}
+
+impl Sweep {
+    /// Depth changes of row `y`, from its depths and those of the next row: distance 0 at depth changes, `far`
+    /// elsewhere. Keeps the changes to the row below for the next row, and the largest magnitudes of finite depths.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn start_row<S: Simd>(
+        &mut self,
+        order: LaneOrder,
+        y: usize,
+        factor: f32,
+        far: f32,
+        row: &mut [Lanes],
+        largest: &mut Lanes,
+    ) {
+        let segment = order.segment;
+        let (own, next) = (self.z_place(order, y), self.z_place(order, y + 1));
+        let (z, below) = (&self.z[own], &self.z[next]);
+        let (tested, above) = (&self.tested[..segment], &mut self.above[..segment]);
+        let row = &mut row[..segment];
+        // SAFETY: as the caller's.
+        unsafe {
+            let far = S::splat(far);
+            let factor = S::splat(factor);
+            let mut most = largest.load::<S>();
+            let end = z[segment - 1].load::<S>();
+            let end_right = z[segment].load::<S>();
+            let mut ends = Lanes::ZERO;
+            for g in 0..2 {
+                let bound = threshold::<S>(end[g], factor);
+                let change = is_change::<S>(end[g], S::finite(end[g]), end_right[g], bound);
+                let tested = tested[segment - 1].load::<S>();
+                ends.store_group::<S>(g, S::and(change, tested[g]));
+            }
+            let mut left = ends.next_lane(0.0).load::<S>();
+            let mut own = z[0].load::<S>();
+            for k in 0..segment {
+                let right = z[k + 1].load::<S>();
+                let (lower, upper) = (below[k].load::<S>(), above[k].load::<S>());
+                let tested = tested[k].load::<S>();
+                for g in 0..2 {
+                    let finite = S::finite(own[g]);
+                    most[g] = S::max(S::and(finite, S::abs(own[g])), most[g]);
+                    let bound = threshold::<S>(own[g], factor);
+                    let to_right =
+                        S::and(is_change::<S>(own[g], finite, right[g], bound), tested[g]);
+                    let to_lower =
+                        S::and(is_change::<S>(own[g], finite, lower[g], bound), tested[g]);
+                    let change = S::or(S::or(to_right, left[g]), S::or(to_lower, upper[g]));
+                    row[k].store_group::<S>(g, S::and_not(change, far));
+                    above[k].store_group::<S>(g, to_lower);
+                    left[g] = to_right;
+                }
+                own = right;
+            }
+            largest.store_group::<S>(0, most[0]);
+            largest.store_group::<S>(1, most[1]);
+        }
+    }
+
+    /// The image's last row: only the row above was tested against it.
+    ///
+    /// # Safety
+    /// As [`Sweep::start_row`].
+    #[inline(always)]
+    unsafe fn start_last_row<S: Simd>(&self, order: LaneOrder, far: f32, row: &mut [Lanes]) {
+        for (row, above) in row[..order.segment].iter_mut().zip(&self.above) {
+            // SAFETY: as the caller's.
+            unsafe {
+                let above = above.load::<S>();
+                row.store_group::<S>(0, S::and_not(above[0], S::splat(far)));
+                row.store_group::<S>(1, S::and_not(above[1], S::splat(far)));
+            }
+        }
+    }
+
+    /// Replaces a row's distances by the sides of its windows, pixel by pixel.
+    ///
+    /// # Safety
+    /// As [`Sweep::test_below`].
+    #[inline(always)]
+    unsafe fn sides<S: Simd>(
+        &mut self,
+        points: &Points,
+        options: &Options,
+        y: usize,
+        order: LaneOrder,
+        row: &mut [Lanes],
+    ) {
+        let segment = order.segment;
+        let place = self.z_place(order, y);
+        let (distances, z, sides) = (&row[1..=segment], &self.z[place], &mut self.sides[..segment]);
+        // SAFETY: as the caller's; the sides fit i32.
+        unsafe {
+            let size = S::splat(options.normal_smoothing_size);
+            let ten = S::splat(10.0);
+            let side = |distance, smoothing| {
+                let smallest = S::min(distance, smoothing);
+                let whole = S::truncate(S::min(smallest, S::splat(LARGEST)));
+                S::and(S::lt(S::splat(SMALLEST), smallest), whole)
+            };
+            for k in 0..segment {
+                let distances = distances[k].load::<S>();
+                let z = z[k].load::<S>();
+                let smoothing = |g: usize| {
+                    if options.depth_dependent_smoothing {
+                        S::add(size, S::div(z[g], ten))
+                    } else {
+                        size
+                    }
+                };
+                sides[k].store_group::<S>(0, side(distances[0], smoothing(0)));
+                sides[k].store_group::<S>(1, side(distances[1], smoothing(1)));
+            }
+        }
+        let row = floats_mut(row);
+        order.write(&self.sides, row);
+        // The one pixel whose own depth nobody tests.
+        if y + 1 == points.height() && !points.z(order.width - 1, y).is_finite() {
+            row[order.width - 1] = 0.0;
+        }
+        let border = options.ignored_border().min(order.width);
+        if y < border || y + border >= points.height() {
+            row[..order.width].fill(0.0);
+        }
+        row[..border].fill(0.0);
+        row[order.width - border..order.width].fill(0.0);
+    }
+}
+
+/// `depth_change::threshold`
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn threshold<S: Simd>(z: S::F, factor: S::F) -> S::F {
+    // SAFETY: as the caller's.
+    unsafe { S::mul(S::mul(factor, S::add(S::abs(z), S::splat(1.0))), S::splat(2.0)) }
+}
+
+/// `depth_change::is_depth_change`, where `finite` says whether `z` is.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn is_change<S: Simd>(z: S::F, finite: S::F, neighbour: S::F, threshold: S::F) -> S::F {
+    // SAFETY: as the caller's.
+    unsafe {
+        let apart = S::lt(threshold, S::abs(S::sub(z, neighbour)));
+        let finite = S::and(finite, S::finite(neighbour));
+        S::or(apart, S::and_not(finite, S::splat(f32::from_bits(!0))))
+    }
+}
+
+/// Fills a row's first and last element with the neighbouring segments' ends.
+#[inline(always)]
+fn close_ends(row: &mut [Lanes], far: f32) {
+    let last = row.len() - 1;
+    let (begin, end) = (row[1], row[last - 1]);
+    row[0] = end.next_lane(far);
+    row[last] = begin.previous_lane(far);
+}
+
+/// The least of what an element's three neighbours in the next row over give, and its own value.
+#[inline(always)]
+unsafe fn nearest<S: Simd>(own: &Lanes, over: &[Lanes; 3]) -> [S::F; 2] {
+    // SAFETY: as the caller's.
+    unsafe {
+        let (straight, diagonal) = (S::splat(STRAIGHT), S::splat(DIAGONAL));
+        let own = own.load::<S>();
+        let [a, b, c] = [over[0].load::<S>(), over[1].load::<S>(), over[2].load::<S>()];
+        let least = |g: usize| {
+            let diagonals = S::min(S::add(a[g], diagonal), S::add(c[g], diagonal));
+            S::min(S::min(own[g], S::add(b[g], straight)), diagonals)
+        };
+        [least(0), least(1)]
+    }
+}
+
+/// An element's neighbours in the next row over.
+#[inline(always)]
+fn three(over: &[Lanes], at: usize) -> &[Lanes; 3] {
+    over[at - 1..at + 2].first_chunk().expect("three elements")
+}
+
+/// The step along the row.
+#[inline(always)]
+unsafe fn along<S: Simd>(nearest: [S::F; 2], before: [S::F; 2]) -> [S::F; 2] {
+    // SAFETY: as the caller's.
+    unsafe {
+        let straight = S::splat(STRAIGHT);
+        [
+            S::min(nearest[0], S::add(before[0], straight)),
+            S::min(nearest[1], S::add(before[1], straight)),
+        ]
+    }
+}
+
+/// The forward pass over one row; `above` is done.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn forward<S: Simd>(order: LaneOrder, above: &[Lanes], row: &mut [Lanes]) {
+    let segment = order.segment;
+    let (above, row) = (&above[..segment + 2], &mut row[..segment + 2]);
+    let first = row[1].0[0];
+    // SAFETY: as the caller's.
+    unsafe {
+        let start = nearest::<S>(&row[1], three(above, 1));
+        row[1].store_group::<S>(0, start[0]);
+        row[1].store_group::<S>(1, start[1]);
+        row[1].0[0] = first; // column 0 stays
+        let mut left = row[1].load::<S>();
+        for at in 2..=segment {
+            left = along::<S>(nearest::<S>(&row[at], three(above, at)), left);
+            row[at].store_group::<S>(0, left[0]);
+            row[at].store_group::<S>(1, left[1]);
+        }
+    }
+    for lane in 1..LANES {
+        carry(row[segment].0[lane - 1], row[1..=segment].iter_mut(), lane);
+    }
+    // The last column's upper right neighbour is column 0 of this row.
+    wrap(order, row, order.width - 1, 0);
+}
+
+/// The backward pass over one row; `below` is done.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn backward<S: Simd>(order: LaneOrder, row: &mut [Lanes], below: &[Lanes], far: f32) {
+    let segment = order.segment;
+    let (below, row) = (&below[..segment + 2], &mut row[..segment + 2]);
+    let (last_element, last_lane) = order.place(order.width - 1);
+    let last = row[last_element + 1].0[last_lane];
+    // SAFETY: as the caller's.
+    unsafe {
+        let mut right = [S::splat(far); 2];
+        for at in (last_element + 1..=segment).rev() {
+            right = along::<S>(nearest::<S>(&row[at], three(below, at)), right);
+            row[at].store_group::<S>(0, right[0]);
+            row[at].store_group::<S>(1, right[1]);
+        }
+        row[last_element + 1].0[last_lane] = last; // the last column stays
+        right = row[last_element + 1].load::<S>();
+        for at in (1..=last_element).rev() {
+            right = along::<S>(nearest::<S>(&row[at], three(below, at)), right);
+            row[at].store_group::<S>(0, right[0]);
+            row[at].store_group::<S>(1, right[1]);
+        }
+    }
+    for lane in (0..last_lane).rev() {
+        carry(row[1].0[lane + 1], row[1..=segment].iter_mut().rev(), lane);
+    }
+    // Column 0's lower left neighbour is the last column of this row.
+    wrap(order, row, 0, order.width - 1);
+}
+
+/// Goes on with the step along the row from the end of one segment through the next, as far as it is nearer.
+#[inline(always)]
+fn carry<'a>(end: f32, segment: impl Iterator<Item = &'a mut Lanes>, lane: usize) {
+    let mut value = end + STRAIGHT;
+    for element in segment {
+        if value >= element.0[lane] {
+            break;
+        }
+        element.0[lane] = value;
+        value += STRAIGHT;
+    }
+}
+
+/// The step around the row's end: pixel `x` may be reached diagonally from pixel `from`.
+#[inline(always)]
+fn wrap(order: LaneOrder, row: &mut [Lanes], x: usize, from: usize) {
+    let ((k, l), (from_k, from_l)) = (order.place(x), order.place(from));
+    row[k + 1].0[l] = row[k + 1].0[l].min(row[from_k + 1].0[from_l] + DIAGONAL);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::depth_change::depth_change_map;
+    use crate::distance::distance_map;
+    use crate::simd::portable::Portable;
+    use crate::smoothing_area::window_side;
+
+    /// Depths with steps and holes, the same for the same seed.
+    fn depths(width: usize, height: usize, seed: u32) -> Vec<f32> {
+        let mut state = seed.wrapping_mul(2_654_435_761) | 1;
+        let mut random = move || {
+            state ^= state << 13;
+            state ^= state >> 17;
+            state ^= state << 5;
+            state
+        };
+        (0..width * height)
+            .map(|_| match random() % 97 {
+                0 => f32::NAN,
+                1 => 3.0,
+                2 => f32::INFINITY,
+                _ => 1.0,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_sweeps_equal_the_plain_maps() {
+        for width in (3..70).chain([640, 1024]) {
+            for (height, seed) in [(3, 1), (4, 2), (23, 3), (50, 4)] {
+                let z = depths(width, height, seed * 1000 + width as u32);
+                let points = Points::planes([&z, &z, &z], width, height, 0).unwrap();
+                let options = Options {
+                    normal_smoothing_size: 9.5,
+                    border_policy: crate::BorderPolicy::Mirror,
+                    depth_dependent_smoothing: seed % 2 == 0,
+                    ..Options::default()
+                };
+                let changes = depth_change_map(&points, options.max_depth_change_factor);
+                let distances = distance_map(&changes, width, height);
+
+                let mut rows = vec![Lanes::ZERO; row_length(width) * height];
+                let mut windows = WindowRows::new(width, &mut rows);
+                let mut sweep = Sweep::default();
+                // SAFETY: the portable path runs everywhere.
+                unsafe {
+                    windows.sweep_down::<Portable>(&points, &options, (0, height), &mut sweep);
+                    windows.sweep_up::<Portable>(&points, &options, (0, height), &mut sweep);
+                }
+                for y in 0..height {
+                    for x in 0..width {
+                        let expected =
+                            window_side(distances[y * width + x], points.z(x, y), &options);
+                        assert_eq!(
+                            sides(&rows, width, y)[x],
+                            expected as f32,
+                            "{width}x{height} {x},{y}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}

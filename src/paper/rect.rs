@@ -1,0 +1,27 @@
+//! Rectangles of pixels inside the image.
+
+use std::ops::Range;
+
+/// Columns and rows.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Rect {
+    pub x: Range<usize>,
+    pub y: Range<usize>,
+}
+
+impl Rect {
+    /// The pixels at most `reach` columns and rows away from one, inside an image of this size.
+    pub fn around((x, y): (usize, usize), reach: usize, (width, height): (usize, usize)) -> Rect {
+        let clip = |at: usize, size: usize| at.saturating_sub(reach)..(at + reach + 1).min(size);
+        Rect { x: clip(x, width), y: clip(y, height) }
+    }
+
+    pub fn pixels(&self) -> impl Iterator<Item = (usize, usize)> + use<'_> {
+        self.y.clone().flat_map(move |y| self.x.clone().map(move |x| (x, y)))
+    }
+
+    /// The longer side.
+    pub fn side(&self) -> usize {
+        self.x.len().max(self.y.len())
+    }
+}

@@ -1,0 +1,144 @@
+//! Eight pixels at a time on every instruction set.
+//!
+//! Algorithms are written once, over [`Simd`], in `#[inline(always)]` functions; only the outermost function of a
+//! path is compiled for its instruction set. No operation fuses or reorders, so every path gives the same bits.
+
+pub(crate) mod portable;
+pub(crate) mod twice;
+
+#[cfg(target_arch = "aarch64")]
+pub(crate) mod neon;
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod x86;
+
+/// Pixels in a group.
+pub(crate) const GROUP: usize = 8;
+
+/// Eight floats, integers or doubles and what can be done with them. Masks are floats whose bits are all ones or
+/// all zeros (doubles for [`Simd::D`]).
+///
+/// # Safety
+/// The methods may only be called where the processor has the implementor's instruction set: within a function
+/// that [`crate::isa`] dispatched to. Loads and stores are of eight elements, at any address aligned to one.
+pub(crate) trait Simd: Copy {
+    /// Eight f32.
+    type F: Copy;
+    /// Eight i32.
+    type I: Copy;
+    /// Eight f64.
+    type D: Copy;
+
+    unsafe fn splat(value: f32) -> Self::F;
+    unsafe fn load(from: *const f32) -> Self::F;
+    unsafe fn store(to: *mut f32, value: Self::F);
+    unsafe fn add(a: Self::F, b: Self::F) -> Self::F;
+    unsafe fn sub(a: Self::F, b: Self::F) -> Self::F;
+    unsafe fn mul(a: Self::F, b: Self::F) -> Self::F;
+    unsafe fn div(a: Self::F, b: Self::F) -> Self::F;
+    unsafe fn sqrt(a: Self::F) -> Self::F;
+    /// `a < b ? a : b`
+    unsafe fn min(a: Self::F, b: Self::F) -> Self::F;
+    /// `a > b ? a : b`
+    unsafe fn max(a: Self::F, b: Self::F) -> Self::F;
+    /// The mask `a < b`, false where one is NaN.
+    unsafe fn lt(a: Self::F, b: Self::F) -> Self::F;
+    /// The mask `a == b`.
+    unsafe fn eq(a: Self::F, b: Self::F) -> Self::F;
+    unsafe fn and(a: Self::F, b: Self::F) -> Self::F;
+    unsafe fn or(a: Self::F, b: Self::F) -> Self::F;
+    unsafe fn xor(a: Self::F, b: Self::F) -> Self::F;
+    /// `!mask & a`
+    unsafe fn and_not(mask: Self::F, a: Self::F) -> Self::F;
+    /// Bit l is lane l of a mask.
+    unsafe fn bits(mask: Self::F) -> u32;
+
+    unsafe fn load_i(from: *const i32) -> Self::I;
+    unsafe fn store_i(to: *mut i32, value: Self::I);
+    unsafe fn splat_i(value: i32) -> Self::I;
+    unsafe fn add_i(a: Self::I, b: Self::I) -> Self::I;
+    unsafe fn sub_i(a: Self::I, b: Self::I) -> Self::I;
+    /// Lane l becomes the sum of lanes 0 to l.
+    unsafe fn prefix_sum_i(a: Self::I) -> Self::I;
+    /// Every lane takes the value of the last one.
+    unsafe fn last_i(a: Self::I) -> Self::I;
+    /// `lanes` bit l ? yes : no
+    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I;
+    /// Nearest integers, ties to even; the value must fit.
+    unsafe fn round_i(a: Self::F) -> Self::I;
+    /// Integers towards zero; the value must fit.
+    unsafe fn truncate_i(a: Self::F) -> Self::I;
+    unsafe fn float_i(a: Self::I) -> Self::F;
+
+    unsafe fn splat_d(value: f64) -> Self::D;
+    unsafe fn load_d(from: *const f64) -> Self::D;
+    unsafe fn store_d(to: *mut f64, value: Self::D);
+    unsafe fn add_d(a: Self::D, b: Self::D) -> Self::D;
+    unsafe fn sub_d(a: Self::D, b: Self::D) -> Self::D;
+    unsafe fn mul_d(a: Self::D, b: Self::D) -> Self::D;
+    unsafe fn div_d(a: Self::D, b: Self::D) -> Self::D;
+    unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D;
+    /// `a < b ? yes : no`
+    unsafe fn select_lt_d(a: Self::D, b: Self::D, yes: Self::D, no: Self::D) -> Self::D;
+    /// Bit l is `a < b` in lane l.
+    unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32;
+    /// `lanes` bit l ? yes : no
+    unsafe fn select_bits_d(lanes: u32, yes: Self::D, no: Self::D) -> Self::D;
+    unsafe fn prefix_sum_d(a: Self::D) -> Self::D;
+    unsafe fn last_d(a: Self::D) -> Self::D;
+    /// f32 to f64.
+    unsafe fn widen(a: Self::F) -> Self::D;
+    /// f64 to f32.
+    unsafe fn narrow(a: Self::D) -> Self::F;
+
+    /// `mask ? yes : no`
+    #[inline(always)]
+    unsafe fn select(mask: Self::F, yes: Self::F, no: Self::F) -> Self::F {
+        // SAFETY: as the caller's.
+        unsafe { Self::or(Self::and(mask, yes), Self::and_not(mask, no)) }
+    }
+
+    #[inline(always)]
+    unsafe fn abs(a: Self::F) -> Self::F {
+        // SAFETY: as the caller's.
+        unsafe { Self::and_not(Self::splat(-0.0), a) }
+    }
+
+    /// The mask of finite lanes.
+    #[inline(always)]
+    unsafe fn finite(a: Self::F) -> Self::F {
+        // SAFETY: as the caller's.
+        unsafe { Self::lt(Self::abs(a), Self::splat(f32::INFINITY)) }
+    }
+
+    /// Whole numbers towards zero; the value must fit i32.
+    #[inline(always)]
+    unsafe fn truncate(a: Self::F) -> Self::F {
+        // SAFETY: as the caller's.
+        unsafe { Self::float_i(Self::truncate_i(a)) }
+    }
+
+    /// The mask whose lane l is bit l.
+    #[inline(always)]
+    unsafe fn mask(bits: u32) -> Self::F {
+        // SAFETY: as the caller's; a load of a whole group.
+        unsafe { Self::load(MASKS[(bits & 0xff) as usize].0.as_ptr()) }
+    }
+}
+
+#[repr(C, align(32))]
+struct LaneMask([f32; GROUP]);
+
+/// The mask of every set of lanes.
+static MASKS: [LaneMask; 1 << GROUP] = {
+    let mut masks = [const { LaneMask([0.0; GROUP]) }; 1 << GROUP];
+    let mut bits = 0;
+    while bits < 1 << GROUP {
+        let mut lane = 0;
+        while lane < GROUP {
+            masks[bits].0[lane] = f32::from_bits(if bits >> lane & 1 != 0 { !0 } else { 0 });
+            lane += 1;
+        }
+        bits += 1;
+    }
+    masks
+};

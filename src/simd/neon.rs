@@ -1,0 +1,461 @@
+//! Eight lanes on 64-bit Arm: two registers of floats or integers, four of doubles.
+
+// Every block calls intrinsics of the instruction set that the trait's contract promises.
+#![allow(clippy::undocumented_unsafe_blocks)]
+
+use std::arch::aarch64::*;
+
+use super::Simd;
+
+/// What every 64-bit Arm has.
+#[derive(Clone, Copy)]
+pub(crate) struct Neon;
+
+/// Applies an intrinsic to each of the registers of a group.
+macro_rules! each {
+    ($op:path, $a:expr) => {{
+        let mut registers = $a;
+        for r in &mut registers {
+            *r = $op(*r);
+        }
+        registers
+    }};
+    ($op:path, $a:expr, $b:expr) => {{
+        let (mut registers, b) = ($a, $b);
+        for (r, b) in registers.iter_mut().zip(b) {
+            *r = $op(*r, b);
+        }
+        registers
+    }};
+}
+
+/// `each!` for the bits of floats.
+macro_rules! bitwise {
+    ($op:path, $a:expr, $b:expr) => {{
+        let (mut registers, b) = ($a, $b);
+        for (r, b) in registers.iter_mut().zip(b) {
+            *r = vreinterpretq_f32_u32($op(vreinterpretq_u32_f32(*r), vreinterpretq_u32_f32(b)));
+        }
+        registers
+    }};
+}
+
+/// Picks, lane by lane, where a comparison holds: unlike Arm's own minimum and maximum, `b` where one is NaN.
+macro_rules! pick {
+    ($compare:path, $select:path, $a:expr, $b:expr) => {{
+        let (mut registers, b) = ($a, $b);
+        for (r, b) in registers.iter_mut().zip(b) {
+            *r = $select($compare(*r, b), *r, b);
+        }
+        registers
+    }};
+}
+
+/// The masks of lanes 0 to 3 and of lanes 4 to 7.
+#[inline(always)]
+unsafe fn lane_masks(lanes: u32) -> [uint32x4_t; 2] {
+    unsafe { each_mask(Neon::mask(lanes)) }
+}
+
+#[inline(always)]
+unsafe fn each_mask(mask: [float32x4_t; 2]) -> [uint32x4_t; 2] {
+    unsafe { [vreinterpretq_u32_f32(mask[0]), vreinterpretq_u32_f32(mask[1])] }
+}
+
+impl Simd for Neon {
+    type F = [float32x4_t; 2];
+    type I = [int32x4_t; 2];
+    type D = [float64x2_t; 4];
+
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self::F {
+        unsafe { [vdupq_n_f32(value); 2] }
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self::F {
+        unsafe { [vld1q_f32(from), vld1q_f32(from.add(4))] }
+    }
+    #[inline(always)]
+    unsafe fn store(to: *mut f32, value: Self::F) {
+        unsafe {
+            vst1q_f32(to, value[0]);
+            vst1q_f32(to.add(4), value[1]);
+        }
+    }
+    #[inline(always)]
+    unsafe fn add(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { each!(vaddq_f32, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn sub(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { each!(vsubq_f32, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn mul(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { each!(vmulq_f32, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn div(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { each!(vdivq_f32, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn sqrt(a: Self::F) -> Self::F {
+        unsafe { each!(vsqrtq_f32, a) }
+    }
+    #[inline(always)]
+    unsafe fn min(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { pick!(vcltq_f32, vbslq_f32, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn max(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { pick!(vcgtq_f32, vbslq_f32, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn lt(a: Self::F, b: Self::F) -> Self::F {
+        unsafe {
+            [
+                vreinterpretq_f32_u32(vcltq_f32(a[0], b[0])),
+                vreinterpretq_f32_u32(vcltq_f32(a[1], b[1])),
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn eq(a: Self::F, b: Self::F) -> Self::F {
+        unsafe {
+            [
+                vreinterpretq_f32_u32(vceqq_f32(a[0], b[0])),
+                vreinterpretq_f32_u32(vceqq_f32(a[1], b[1])),
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn and(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { bitwise!(vandq_u32, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn or(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { bitwise!(vorrq_u32, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn xor(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { bitwise!(veorq_u32, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn and_not(mask: Self::F, a: Self::F) -> Self::F {
+        unsafe { bitwise!(vbicq_u32, a, mask) }
+    }
+    #[inline(always)]
+    unsafe fn bits(mask: Self::F) -> u32 {
+        const PLACES: [[u32; 4]; 2] = [[1, 2, 4, 8], [16, 32, 64, 128]];
+        unsafe {
+            // The highest bit of a lane decides, as on other instruction sets.
+            let [low, high] = each_mask(mask);
+            let spread =
+                |lanes| vreinterpretq_u32_s32(vshrq_n_s32::<31>(vreinterpretq_s32_u32(lanes)));
+            let low = vandq_u32(spread(low), vld1q_u32(PLACES[0].as_ptr()));
+            let high = vandq_u32(spread(high), vld1q_u32(PLACES[1].as_ptr()));
+            vaddvq_u32(vorrq_u32(low, high))
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn load_i(from: *const i32) -> Self::I {
+        unsafe { [vld1q_s32(from), vld1q_s32(from.add(4))] }
+    }
+    #[inline(always)]
+    unsafe fn store_i(to: *mut i32, value: Self::I) {
+        unsafe {
+            vst1q_s32(to, value[0]);
+            vst1q_s32(to.add(4), value[1]);
+        }
+    }
+    #[inline(always)]
+    unsafe fn splat_i(value: i32) -> Self::I {
+        unsafe { [vdupq_n_s32(value); 2] }
+    }
+    #[inline(always)]
+    unsafe fn add_i(a: Self::I, b: Self::I) -> Self::I {
+        unsafe { each!(vaddq_s32, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn sub_i(a: Self::I, b: Self::I) -> Self::I {
+        unsafe { each!(vsubq_s32, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn prefix_sum_i(a: Self::I) -> Self::I {
+        #[inline(always)]
+        unsafe fn half(a: int32x4_t) -> int32x4_t {
+            unsafe {
+                let zero = vdupq_n_s32(0);
+                let a = vaddq_s32(a, vextq_s32::<3>(zero, a));
+                vaddq_s32(a, vextq_s32::<2>(zero, a))
+            }
+        }
+        unsafe {
+            let (low, high) = (half(a[0]), half(a[1]));
+            [low, vaddq_s32(high, vdupq_laneq_s32::<3>(low))]
+        }
+    }
+    #[inline(always)]
+    unsafe fn last_i(a: Self::I) -> Self::I {
+        unsafe { [vdupq_laneq_s32::<3>(a[1]); 2] }
+    }
+    #[inline(always)]
+    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
+        unsafe {
+            let mask = lane_masks(lanes);
+            [vbslq_s32(mask[0], yes[0], no[0]), vbslq_s32(mask[1], yes[1], no[1])]
+        }
+    }
+    #[inline(always)]
+    unsafe fn round_i(a: Self::F) -> Self::I {
+        unsafe { [vcvtnq_s32_f32(a[0]), vcvtnq_s32_f32(a[1])] }
+    }
+    #[inline(always)]
+    unsafe fn truncate_i(a: Self::F) -> Self::I {
+        unsafe { [vcvtq_s32_f32(a[0]), vcvtq_s32_f32(a[1])] }
+    }
+    #[inline(always)]
+    unsafe fn float_i(a: Self::I) -> Self::F {
+        unsafe { [vcvtq_f32_s32(a[0]), vcvtq_f32_s32(a[1])] }
+    }
+
+    #[inline(always)]
+    unsafe fn splat_d(value: f64) -> Self::D {
+        unsafe { [vdupq_n_f64(value); 4] }
+    }
+    #[inline(always)]
+    unsafe fn load_d(from: *const f64) -> Self::D {
+        unsafe {
+            [
+                vld1q_f64(from),
+                vld1q_f64(from.add(2)),
+                vld1q_f64(from.add(4)),
+                vld1q_f64(from.add(6)),
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn store_d(to: *mut f64, value: Self::D) {
+        for (i, half) in value.into_iter().enumerate() {
+            unsafe { vst1q_f64(to.add(2 * i), half) };
+        }
+    }
+    #[inline(always)]
+    unsafe fn add_d(a: Self::D, b: Self::D) -> Self::D {
+        unsafe { each!(vaddq_f64, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn sub_d(a: Self::D, b: Self::D) -> Self::D {
+        unsafe { each!(vsubq_f64, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn mul_d(a: Self::D, b: Self::D) -> Self::D {
+        unsafe { each!(vmulq_f64, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn div_d(a: Self::D, b: Self::D) -> Self::D {
+        unsafe { each!(vdivq_f64, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn sqrt_d(a: Self::D) -> Self::D {
+        unsafe { each!(vsqrtq_f64, a) }
+    }
+    #[inline(always)]
+    unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D {
+        unsafe { pick!(vcgtq_f64, vbslq_f64, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn select_lt_d(a: Self::D, b: Self::D, yes: Self::D, no: Self::D) -> Self::D {
+        let mut lanes = no;
+        for i in 0..4 {
+            lanes[i] = unsafe { vbslq_f64(vcltq_f64(a[i], b[i]), yes[i], no[i]) };
+        }
+        lanes
+    }
+    #[inline(always)]
+    unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32 {
+        unsafe {
+            let mask = |i: usize| vcltq_f64(a[i], b[i]);
+            let narrow = |i: usize| {
+                vreinterpretq_f32_u32(vcombine_u32(vmovn_u64(mask(i)), vmovn_u64(mask(i + 1))))
+            };
+            Self::bits([narrow(0), narrow(2)])
+        }
+    }
+    #[inline(always)]
+    unsafe fn select_bits_d(lanes: u32, yes: Self::D, no: Self::D) -> Self::D {
+        unsafe {
+            let [low, high] = lane_masks(lanes);
+            let mask = [
+                vreinterpretq_u64_u32(vzip1q_u32(low, low)),
+                vreinterpretq_u64_u32(vzip2q_u32(low, low)),
+                vreinterpretq_u64_u32(vzip1q_u32(high, high)),
+                vreinterpretq_u64_u32(vzip2q_u32(high, high)),
+            ];
+            let mut lanes = no;
+            for i in 0..4 {
+                lanes[i] = vbslq_f64(mask[i], yes[i], no[i]);
+            }
+            lanes
+        }
+    }
+    #[inline(always)]
+    unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
+        /// Four lanes: each gets the one before, then the one two before.
+        #[inline(always)]
+        unsafe fn half(low: float64x2_t, high: float64x2_t) -> [float64x2_t; 2] {
+            unsafe {
+                let low_1 = vaddq_f64(low, vextq_f64::<1>(vdupq_n_f64(0.0), low));
+                let high_1 = vaddq_f64(high, vextq_f64::<1>(low, high));
+                [low_1, vaddq_f64(high_1, low_1)]
+            }
+        }
+        unsafe {
+            let ([low, low_last], [high, high_last]) = (half(a[0], a[1]), half(a[2], a[3]));
+            let total = vdupq_laneq_f64::<1>(low_last);
+            [low, low_last, vaddq_f64(high, total), vaddq_f64(high_last, total)]
+        }
+    }
+    #[inline(always)]
+    unsafe fn last_d(a: Self::D) -> Self::D {
+        unsafe { [vdupq_laneq_f64::<1>(a[3]); 4] }
+    }
+    #[inline(always)]
+    unsafe fn widen(a: Self::F) -> Self::D {
+        unsafe {
+            [
+                vcvt_f64_f32(vget_low_f32(a[0])),
+                vcvt_high_f64_f32(a[0]),
+                vcvt_f64_f32(vget_low_f32(a[1])),
+                vcvt_high_f64_f32(a[1]),
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn narrow(a: Self::D) -> Self::F {
+        unsafe {
+            [
+                vcvt_high_f32_f64(vcvt_f32_f64(a[0]), a[1]),
+                vcvt_high_f32_f64(vcvt_f32_f64(a[2]), a[3]),
+            ]
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::portable::Portable;
+    use super::*;
+
+    const FLOATS: [f32; 16] = [
+        0.0,
+        -0.0,
+        1.5,
+        -2.5,
+        0.1,
+        -7.3,
+        f32::NAN,
+        f32::INFINITY,
+        f32::NEG_INFINITY,
+        f32::MIN_POSITIVE,
+        1e-41,
+        3.5,
+        123_456.7,
+        -1e30,
+        2.5,
+        1.0,
+    ];
+
+    /// Groups of which every lane meets many values.
+    fn groups() -> impl Iterator<Item = ([f32; 8], [f32; 8])> {
+        (0..16).flat_map(|i| {
+            (0..16).map(move |j| {
+                let a = std::array::from_fn(|l| FLOATS[(l + i) % 16]);
+                (a, std::array::from_fn(|l| FLOATS[(3 * l + j) % 16]))
+            })
+        })
+    }
+
+    /// What the group operations give for one pair of groups, as bits. NaN are one value: only their signs and
+    /// payloads differ.
+    fn results<S: Simd>(a: [f32; 8], b: [f32; 8]) -> Vec<u64> {
+        let mut results = Vec::new();
+        // SAFETY: NEON is part of every 64-bit Arm, and the portable path runs everywhere.
+        unsafe {
+            let (x, y) = (S::load(a.as_ptr()), S::load(b.as_ptr()));
+            let (dx, dy) = (S::widen(x), S::widen(y));
+            let tenth = S::splat_d(0.1);
+            let bits = S::bits(S::lt(x, y));
+            let floats = [
+                S::add(x, y),
+                S::sub(x, y),
+                S::mul(x, y),
+                S::div(x, y),
+                S::sqrt(x),
+                S::min(x, y),
+                S::max(x, y),
+                S::and(x, y),
+                S::or(x, y),
+                S::xor(x, y),
+                S::and_not(x, y),
+                S::select(S::mask(bits), x, y),
+                S::finite(x),
+                S::narrow(S::mul_d(dx, tenth)),
+            ];
+            let small =
+                [x, y].map(|v| S::select(S::lt(S::abs(v), S::splat(1e6)), v, S::splat(-0.5)));
+            let (i, j) = (S::round_i(small[0]), S::truncate_i(small[1]));
+            let integers = [
+                i,
+                j,
+                S::add_i(i, j),
+                S::sub_i(i, j),
+                S::prefix_sum_i(i),
+                S::last_i(i),
+                S::select_i(bits, i, j),
+            ];
+            let doubles = [
+                dx,
+                S::add_d(dx, tenth),
+                S::sub_d(dx, dy),
+                S::mul_d(dx, dy),
+                S::div_d(dx, dy),
+                S::sqrt_d(dx),
+                S::max_d(dx, dy),
+                S::select_lt_d(dx, dy, tenth, dy),
+                S::select_bits_d(bits, dx, dy),
+                // A zero's sign may get lost.
+                S::add_d(S::prefix_sum_d(S::mul_d(S::widen(small[0]), tenth)), S::splat_d(0.0)),
+                S::last_d(dx),
+            ];
+            for value in floats.into_iter().chain(integers.map(|i| S::float_i(i))) {
+                let mut lanes = [0.0; 8];
+                S::store(lanes.as_mut_ptr(), value);
+                results.extend(lanes.map(|v: f32| {
+                    u64::from(if v.is_nan() { f32::NAN.to_bits() } else { v.to_bits() })
+                }));
+            }
+            for value in doubles {
+                let mut lanes = [0.0; 8];
+                S::store_d(lanes.as_mut_ptr(), value);
+                results.extend(
+                    lanes.map(|v: f64| if v.is_nan() { f64::NAN.to_bits() } else { v.to_bits() }),
+                );
+            }
+            let masks = [bits, S::bits(S::eq(x, y)), S::bits_lt_d(dx, dy)];
+            results.extend(masks.map(u64::from));
+        }
+        results
+    }
+
+    #[test]
+    fn operations_equal_the_portable_ones() {
+        for (a, b) in groups() {
+            let (neon, portable) = (results::<Neon>(a, b), results::<Portable>(a, b));
+            for (at, (neon, portable)) in neon.into_iter().zip(portable).enumerate() {
+                assert_eq!(neon, portable, "value {at} of {a:?} {b:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,248 @@
+//! Eight lanes without any instruction set: what processors without a path of their own use.
+
+use super::{GROUP, Simd};
+
+#[derive(Clone, Copy)]
+pub(crate) struct Portable;
+
+type F = [f32; GROUP];
+type I = [i32; GROUP];
+type D = [f64; GROUP];
+
+#[inline(always)]
+fn zip<A: Copy, B: Copy, C: Copy + Default>(
+    a: [A; GROUP],
+    b: [B; GROUP],
+    f: impl Fn(A, B) -> C,
+) -> [C; GROUP] {
+    let mut lanes = [C::default(); GROUP];
+    for l in 0..GROUP {
+        lanes[l] = f(a[l], b[l]);
+    }
+    lanes
+}
+
+#[inline(always)]
+fn bitwise(a: F, b: F, f: impl Fn(u32, u32) -> u32) -> F {
+    zip(a, b, |a: f32, b: f32| f32::from_bits(f(a.to_bits(), b.to_bits())))
+}
+
+#[inline(always)]
+fn mask(a: F, b: F, f: impl Fn(f32, f32) -> bool) -> F {
+    zip(a, b, |a, b| f32::from_bits(if f(a, b) { !0 } else { 0 }))
+}
+
+#[inline(always)]
+fn prefix_sum<T: Copy>(mut a: [T; GROUP], add: impl Fn(T, T) -> T) -> [T; GROUP] {
+    // In the order of the vector paths, so that sums of doubles round alike.
+    for step in [1, 2, 4] {
+        for l in (step..GROUP).rev() {
+            let within = match step {
+                4 => 3,
+                _ if l / 4 == (l - step) / 4 => l - step,
+                _ => continue,
+            };
+            a[l] = add(a[l], a[within]);
+        }
+    }
+    a
+}
+
+impl Simd for Portable {
+    type F = F;
+    type I = I;
+    type D = D;
+
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> F {
+        [value; GROUP]
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> F {
+        // SAFETY: promised by the caller.
+        unsafe { from.cast::<F>().read_unaligned() }
+    }
+    #[inline(always)]
+    unsafe fn store(to: *mut f32, value: F) {
+        // SAFETY: promised by the caller.
+        unsafe { to.cast::<F>().write_unaligned(value) }
+    }
+    #[inline(always)]
+    unsafe fn add(a: F, b: F) -> F {
+        zip(a, b, |a, b| a + b)
+    }
+    #[inline(always)]
+    unsafe fn sub(a: F, b: F) -> F {
+        zip(a, b, |a, b| a - b)
+    }
+    #[inline(always)]
+    unsafe fn mul(a: F, b: F) -> F {
+        zip(a, b, |a, b| a * b)
+    }
+    #[inline(always)]
+    unsafe fn div(a: F, b: F) -> F {
+        zip(a, b, |a, b| a / b)
+    }
+    #[inline(always)]
+    unsafe fn sqrt(a: F) -> F {
+        zip(a, a, |a, _| a.sqrt())
+    }
+    #[inline(always)]
+    unsafe fn min(a: F, b: F) -> F {
+        zip(a, b, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    unsafe fn max(a: F, b: F) -> F {
+        zip(a, b, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    unsafe fn lt(a: F, b: F) -> F {
+        mask(a, b, |a, b| a < b)
+    }
+    #[inline(always)]
+    unsafe fn eq(a: F, b: F) -> F {
+        mask(a, b, |a, b| a == b)
+    }
+    #[inline(always)]
+    unsafe fn and(a: F, b: F) -> F {
+        bitwise(a, b, |a, b| a & b)
+    }
+    #[inline(always)]
+    unsafe fn or(a: F, b: F) -> F {
+        bitwise(a, b, |a, b| a | b)
+    }
+    #[inline(always)]
+    unsafe fn xor(a: F, b: F) -> F {
+        bitwise(a, b, |a, b| a ^ b)
+    }
+    #[inline(always)]
+    unsafe fn and_not(mask: F, a: F) -> F {
+        bitwise(mask, a, |mask, a| !mask & a)
+    }
+    #[inline(always)]
+    unsafe fn bits(mask: F) -> u32 {
+        (0..GROUP).fold(0, |bits, l| bits | (mask[l].to_bits() >> 31) << l)
+    }
+
+    #[inline(always)]
+    unsafe fn load_i(from: *const i32) -> I {
+        // SAFETY: promised by the caller.
+        unsafe { from.cast::<I>().read_unaligned() }
+    }
+    #[inline(always)]
+    unsafe fn store_i(to: *mut i32, value: I) {
+        // SAFETY: promised by the caller.
+        unsafe { to.cast::<I>().write_unaligned(value) }
+    }
+    #[inline(always)]
+    unsafe fn splat_i(value: i32) -> I {
+        [value; GROUP]
+    }
+    #[inline(always)]
+    unsafe fn add_i(a: I, b: I) -> I {
+        zip(a, b, i32::wrapping_add)
+    }
+    #[inline(always)]
+    unsafe fn sub_i(a: I, b: I) -> I {
+        zip(a, b, i32::wrapping_sub)
+    }
+    #[inline(always)]
+    unsafe fn prefix_sum_i(a: I) -> I {
+        prefix_sum(a, i32::wrapping_add)
+    }
+    #[inline(always)]
+    unsafe fn last_i(a: I) -> I {
+        [a[GROUP - 1]; GROUP]
+    }
+    #[inline(always)]
+    unsafe fn select_i(bits: u32, yes: I, no: I) -> I {
+        let mut lanes = no;
+        for l in 0..GROUP {
+            lanes[l] = if bits >> l & 1 != 0 { yes[l] } else { no[l] };
+        }
+        lanes
+    }
+    #[inline(always)]
+    unsafe fn round_i(a: F) -> I {
+        zip(a, a, |a, _| a.round_ties_even() as i32)
+    }
+    #[inline(always)]
+    unsafe fn truncate_i(a: F) -> I {
+        zip(a, a, |a, _| a as i32)
+    }
+    #[inline(always)]
+    unsafe fn float_i(a: I) -> F {
+        zip(a, a, |a, _| a as f32)
+    }
+
+    #[inline(always)]
+    unsafe fn splat_d(value: f64) -> D {
+        [value; GROUP]
+    }
+    #[inline(always)]
+    unsafe fn load_d(from: *const f64) -> D {
+        // SAFETY: promised by the caller.
+        unsafe { from.cast::<D>().read_unaligned() }
+    }
+    #[inline(always)]
+    unsafe fn store_d(to: *mut f64, value: D) {
+        // SAFETY: promised by the caller.
+        unsafe { to.cast::<D>().write_unaligned(value) }
+    }
+    #[inline(always)]
+    unsafe fn add_d(a: D, b: D) -> D {
+        zip(a, b, |a, b| a + b)
+    }
+    #[inline(always)]
+    unsafe fn sub_d(a: D, b: D) -> D {
+        zip(a, b, |a, b| a - b)
+    }
+    #[inline(always)]
+    unsafe fn mul_d(a: D, b: D) -> D {
+        zip(a, b, |a, b| a * b)
+    }
+    #[inline(always)]
+    unsafe fn div_d(a: D, b: D) -> D {
+        zip(a, b, |a, b| a / b)
+    }
+    #[inline(always)]
+    unsafe fn max_d(a: D, b: D) -> D {
+        zip(a, b, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    unsafe fn select_lt_d(a: D, b: D, yes: D, no: D) -> D {
+        let mut lanes = no;
+        for l in 0..GROUP {
+            lanes[l] = if a[l] < b[l] { yes[l] } else { no[l] };
+        }
+        lanes
+    }
+    #[inline(always)]
+    unsafe fn bits_lt_d(a: D, b: D) -> u32 {
+        (0..GROUP).fold(0, |bits, l| bits | u32::from(a[l] < b[l]) << l)
+    }
+    #[inline(always)]
+    unsafe fn select_bits_d(bits: u32, yes: D, no: D) -> D {
+        let mut lanes = no;
+        for l in 0..GROUP {
+            lanes[l] = if bits >> l & 1 != 0 { yes[l] } else { no[l] };
+        }
+        lanes
+    }
+    #[inline(always)]
+    unsafe fn prefix_sum_d(a: D) -> D {
+        prefix_sum(a, |a, b| a + b)
+    }
+    #[inline(always)]
+    unsafe fn last_d(a: D) -> D {
+        [a[GROUP - 1]; GROUP]
+    }
+    #[inline(always)]
+    unsafe fn widen(a: F) -> D {
+        zip(a, a, |a, _| f64::from(a))
+    }
+    #[inline(always)]
+    unsafe fn narrow(a: D) -> F {
+        zip(a, a, |a, _| a as f32)
+    }
+}

@@ -1,0 +1,134 @@
+//! Sixteen pixels as two groups of eight: twice as many operations that do not wait for one another.
+
+use super::Simd;
+
+/// Two groups of `S`. Masks of lanes have 16 bits, the first group's in the lower half. Groups are paired from two
+/// loads; nothing here reads or writes memory.
+#[derive(Clone, Copy)]
+pub(crate) struct Twice<S>(std::marker::PhantomData<S>);
+
+macro_rules! each {
+    ($($name:ident($($operand:ident: $type:ident),*) -> $result:ident;)*) => {
+        $(#[inline(always)]
+        unsafe fn $name($($operand: Self::$type),*) -> Self::$result {
+            // SAFETY: as the caller's.
+            unsafe { [S::$name($($operand[0]),*), S::$name($($operand[1]),*)] }
+        })*
+    };
+}
+
+impl<S: Simd> Simd for Twice<S> {
+    type F = [S::F; 2];
+    type I = [S::I; 2];
+    type D = [S::D; 2];
+
+    each! {
+        add(a: F, b: F) -> F;
+        sub(a: F, b: F) -> F;
+        mul(a: F, b: F) -> F;
+        div(a: F, b: F) -> F;
+        sqrt(a: F) -> F;
+        min(a: F, b: F) -> F;
+        max(a: F, b: F) -> F;
+        lt(a: F, b: F) -> F;
+        eq(a: F, b: F) -> F;
+        and(a: F, b: F) -> F;
+        or(a: F, b: F) -> F;
+        xor(a: F, b: F) -> F;
+        and_not(mask: F, a: F) -> F;
+        add_i(a: I, b: I) -> I;
+        sub_i(a: I, b: I) -> I;
+        prefix_sum_i(a: I) -> I;
+        last_i(a: I) -> I;
+        round_i(a: F) -> I;
+        truncate_i(a: F) -> I;
+        float_i(a: I) -> F;
+        add_d(a: D, b: D) -> D;
+        sub_d(a: D, b: D) -> D;
+        mul_d(a: D, b: D) -> D;
+        div_d(a: D, b: D) -> D;
+        max_d(a: D, b: D) -> D;
+        select_lt_d(a: D, b: D, yes: D, no: D) -> D;
+        prefix_sum_d(a: D) -> D;
+        last_d(a: D) -> D;
+        widen(a: F) -> D;
+        narrow(a: D) -> F;
+    }
+
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self::F {
+        // SAFETY: as the caller's.
+        [unsafe { S::splat(value) }; 2]
+    }
+    #[inline(always)]
+    unsafe fn splat_i(value: i32) -> Self::I {
+        // SAFETY: as the caller's.
+        [unsafe { S::splat_i(value) }; 2]
+    }
+    #[inline(always)]
+    unsafe fn splat_d(value: f64) -> Self::D {
+        // SAFETY: as the caller's.
+        [unsafe { S::splat_d(value) }; 2]
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self::F {
+        // SAFETY: as the caller's.
+        unsafe { [S::load(from), S::load(from.add(super::GROUP))] }
+    }
+    #[inline(always)]
+    unsafe fn store(to: *mut f32, value: Self::F) {
+        // SAFETY: as the caller's.
+        unsafe {
+            S::store(to, value[0]);
+            S::store(to.add(super::GROUP), value[1]);
+        }
+    }
+    #[inline(always)]
+    unsafe fn load_i(from: *const i32) -> Self::I {
+        // SAFETY: as the caller's.
+        unsafe { [S::load_i(from), S::load_i(from.add(super::GROUP))] }
+    }
+    #[inline(always)]
+    unsafe fn store_i(to: *mut i32, value: Self::I) {
+        // SAFETY: as the caller's.
+        unsafe {
+            S::store_i(to, value[0]);
+            S::store_i(to.add(super::GROUP), value[1]);
+        }
+    }
+    #[inline(always)]
+    unsafe fn load_d(from: *const f64) -> Self::D {
+        // SAFETY: as the caller's.
+        unsafe { [S::load_d(from), S::load_d(from.add(super::GROUP))] }
+    }
+    #[inline(always)]
+    unsafe fn store_d(to: *mut f64, value: Self::D) {
+        // SAFETY: as the caller's.
+        unsafe {
+            S::store_d(to, value[0]);
+            S::store_d(to.add(super::GROUP), value[1]);
+        }
+    }
+    #[inline(always)]
+    unsafe fn bits(mask: Self::F) -> u32 {
+        // SAFETY: as the caller's.
+        unsafe { S::bits(mask[0]) | S::bits(mask[1]) << super::GROUP }
+    }
+    #[inline(always)]
+    unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32 {
+        // SAFETY: as the caller's.
+        unsafe { S::bits_lt_d(a[0], b[0]) | S::bits_lt_d(a[1], b[1]) << super::GROUP }
+    }
+    #[inline(always)]
+    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
+        let upper = lanes >> super::GROUP;
+        // SAFETY: as the caller's.
+        unsafe { [S::select_i(lanes, yes[0], no[0]), S::select_i(upper, yes[1], no[1])] }
+    }
+    #[inline(always)]
+    unsafe fn select_bits_d(lanes: u32, yes: Self::D, no: Self::D) -> Self::D {
+        let upper = lanes >> super::GROUP;
+        // SAFETY: as the caller's.
+        unsafe { [S::select_bits_d(lanes, yes[0], no[0]), S::select_bits_d(upper, yes[1], no[1])] }
+    }
+}

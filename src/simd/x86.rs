@@ -1,0 +1,514 @@
+//! Eight lanes on x86-64: two SSE2 registers, or one of AVX2.
+//!
+//! AVX-512 processors run the AVX2 form compiled for their instruction set.
+
+// Every block calls intrinsics of the instruction set that the trait's contract promises.
+#![allow(clippy::undocumented_unsafe_blocks)]
+
+use std::arch::x86_64::*;
+
+use super::Simd;
+
+/// What every x86-64 has.
+#[derive(Clone, Copy)]
+pub(crate) struct Sse2;
+
+/// AVX2, on processors that have it.
+#[derive(Clone, Copy)]
+pub(crate) struct Avx2;
+
+/// Applies an intrinsic to each of the registers of a group.
+macro_rules! each {
+    ($op:path, $a:expr) => {{
+        let mut registers = $a;
+        for r in &mut registers {
+            *r = $op(*r);
+        }
+        registers
+    }};
+    ($op:path, $a:expr, $b:expr) => {{
+        let (mut registers, b) = ($a, $b);
+        for (r, b) in registers.iter_mut().zip(b) {
+            *r = $op(*r, b);
+        }
+        registers
+    }};
+}
+
+impl Simd for Sse2 {
+    type F = [__m128; 2];
+    type I = [__m128i; 2];
+    type D = [__m128d; 4];
+
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self::F {
+        unsafe { [_mm_set1_ps(value); 2] }
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self::F {
+        unsafe { [_mm_loadu_ps(from), _mm_loadu_ps(from.add(4))] }
+    }
+    #[inline(always)]
+    unsafe fn store(to: *mut f32, value: Self::F) {
+        unsafe {
+            _mm_storeu_ps(to, value[0]);
+            _mm_storeu_ps(to.add(4), value[1]);
+        }
+    }
+    #[inline(always)]
+    unsafe fn add(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { each!(_mm_add_ps, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn sub(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { each!(_mm_sub_ps, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn mul(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { each!(_mm_mul_ps, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn div(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { each!(_mm_div_ps, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn sqrt(a: Self::F) -> Self::F {
+        unsafe { each!(_mm_sqrt_ps, a) }
+    }
+    #[inline(always)]
+    unsafe fn min(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { each!(_mm_min_ps, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn max(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { each!(_mm_max_ps, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn lt(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { each!(_mm_cmplt_ps, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn eq(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { each!(_mm_cmpeq_ps, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn and(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { each!(_mm_and_ps, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn or(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { each!(_mm_or_ps, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn xor(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { each!(_mm_xor_ps, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn and_not(mask: Self::F, a: Self::F) -> Self::F {
+        unsafe { each!(_mm_andnot_ps, mask, a) }
+    }
+    #[inline(always)]
+    unsafe fn bits(mask: Self::F) -> u32 {
+        unsafe { (_mm_movemask_ps(mask[0]) | _mm_movemask_ps(mask[1]) << 4) as u32 }
+    }
+
+    #[inline(always)]
+    unsafe fn load_i(from: *const i32) -> Self::I {
+        unsafe { [_mm_loadu_si128(from.cast()), _mm_loadu_si128(from.add(4).cast())] }
+    }
+    #[inline(always)]
+    unsafe fn store_i(to: *mut i32, value: Self::I) {
+        unsafe {
+            _mm_storeu_si128(to.cast(), value[0]);
+            _mm_storeu_si128(to.add(4).cast(), value[1]);
+        }
+    }
+    #[inline(always)]
+    unsafe fn splat_i(value: i32) -> Self::I {
+        unsafe { [_mm_set1_epi32(value); 2] }
+    }
+    #[inline(always)]
+    unsafe fn add_i(a: Self::I, b: Self::I) -> Self::I {
+        unsafe { each!(_mm_add_epi32, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn sub_i(a: Self::I, b: Self::I) -> Self::I {
+        unsafe { each!(_mm_sub_epi32, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn prefix_sum_i(a: Self::I) -> Self::I {
+        #[inline(always)]
+        unsafe fn half(mut a: __m128i) -> __m128i {
+            unsafe {
+                a = _mm_add_epi32(a, _mm_slli_si128::<4>(a));
+                _mm_add_epi32(a, _mm_slli_si128::<8>(a))
+            }
+        }
+        unsafe {
+            let (low, high) = (half(a[0]), half(a[1]));
+            [low, _mm_add_epi32(high, _mm_shuffle_epi32::<0xff>(low))]
+        }
+    }
+    #[inline(always)]
+    unsafe fn last_i(a: Self::I) -> Self::I {
+        unsafe { [_mm_shuffle_epi32::<0xff>(a[1]); 2] }
+    }
+    #[inline(always)]
+    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
+        unsafe {
+            let mask = Self::mask(lanes);
+            let mask = [_mm_castps_si128(mask[0]), _mm_castps_si128(mask[1])];
+            each!(_mm_or_si128, each!(_mm_and_si128, mask, yes), each!(_mm_andnot_si128, mask, no))
+        }
+    }
+    #[inline(always)]
+    unsafe fn round_i(a: Self::F) -> Self::I {
+        unsafe { [_mm_cvtps_epi32(a[0]), _mm_cvtps_epi32(a[1])] }
+    }
+    #[inline(always)]
+    unsafe fn truncate_i(a: Self::F) -> Self::I {
+        unsafe { [_mm_cvttps_epi32(a[0]), _mm_cvttps_epi32(a[1])] }
+    }
+    #[inline(always)]
+    unsafe fn float_i(a: Self::I) -> Self::F {
+        unsafe { [_mm_cvtepi32_ps(a[0]), _mm_cvtepi32_ps(a[1])] }
+    }
+
+    #[inline(always)]
+    unsafe fn splat_d(value: f64) -> Self::D {
+        unsafe { [_mm_set1_pd(value); 4] }
+    }
+    #[inline(always)]
+    unsafe fn load_d(from: *const f64) -> Self::D {
+        unsafe {
+            [
+                _mm_loadu_pd(from),
+                _mm_loadu_pd(from.add(2)),
+                _mm_loadu_pd(from.add(4)),
+                _mm_loadu_pd(from.add(6)),
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn store_d(to: *mut f64, value: Self::D) {
+        for (i, half) in value.into_iter().enumerate() {
+            unsafe { _mm_storeu_pd(to.add(2 * i), half) };
+        }
+    }
+    #[inline(always)]
+    unsafe fn add_d(a: Self::D, b: Self::D) -> Self::D {
+        unsafe { each!(_mm_add_pd, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn sub_d(a: Self::D, b: Self::D) -> Self::D {
+        unsafe { each!(_mm_sub_pd, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn mul_d(a: Self::D, b: Self::D) -> Self::D {
+        unsafe { each!(_mm_mul_pd, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn div_d(a: Self::D, b: Self::D) -> Self::D {
+        unsafe { each!(_mm_div_pd, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D {
+        unsafe { each!(_mm_max_pd, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn select_lt_d(a: Self::D, b: Self::D, yes: Self::D, no: Self::D) -> Self::D {
+        unsafe {
+            let mask = each!(_mm_cmplt_pd, a, b);
+            each!(_mm_or_pd, each!(_mm_and_pd, mask, yes), each!(_mm_andnot_pd, mask, no))
+        }
+    }
+    #[inline(always)]
+    unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32 {
+        let mut bits = 0;
+        for (i, (a, b)) in a.into_iter().zip(b).enumerate() {
+            bits |= (unsafe { _mm_movemask_pd(_mm_cmplt_pd(a, b)) } as u32) << (2 * i);
+        }
+        bits
+    }
+    #[inline(always)]
+    unsafe fn select_bits_d(lanes: u32, yes: Self::D, no: Self::D) -> Self::D {
+        unsafe {
+            let mask = Self::mask(lanes);
+            let mask = [
+                _mm_castps_pd(_mm_unpacklo_ps(mask[0], mask[0])),
+                _mm_castps_pd(_mm_unpackhi_ps(mask[0], mask[0])),
+                _mm_castps_pd(_mm_unpacklo_ps(mask[1], mask[1])),
+                _mm_castps_pd(_mm_unpackhi_ps(mask[1], mask[1])),
+            ];
+            each!(_mm_or_pd, each!(_mm_and_pd, mask, yes), each!(_mm_andnot_pd, mask, no))
+        }
+    }
+    #[inline(always)]
+    unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
+        /// Four lanes: each gets the one before, then the one two before.
+        #[inline(always)]
+        unsafe fn half(low: __m128d, high: __m128d) -> [__m128d; 2] {
+            unsafe {
+                let zero = _mm_setzero_pd();
+                let low_1 = _mm_add_pd(low, _mm_unpacklo_pd(zero, low));
+                let high_1 = _mm_add_pd(high, _mm_shuffle_pd::<0b01>(low, high));
+                [low_1, _mm_add_pd(high_1, low_1)]
+            }
+        }
+        unsafe {
+            let ([low, low_last], [high, high_last]) = (half(a[0], a[1]), half(a[2], a[3]));
+            let total = _mm_unpackhi_pd(low_last, low_last);
+            [low, low_last, _mm_add_pd(high, total), _mm_add_pd(high_last, total)]
+        }
+    }
+    #[inline(always)]
+    unsafe fn last_d(a: Self::D) -> Self::D {
+        unsafe { [_mm_unpackhi_pd(a[3], a[3]); 4] }
+    }
+    #[inline(always)]
+    unsafe fn widen(a: Self::F) -> Self::D {
+        unsafe {
+            [
+                _mm_cvtps_pd(a[0]),
+                _mm_cvtps_pd(_mm_movehl_ps(a[0], a[0])),
+                _mm_cvtps_pd(a[1]),
+                _mm_cvtps_pd(_mm_movehl_ps(a[1], a[1])),
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn narrow(a: Self::D) -> Self::F {
+        unsafe {
+            [
+                _mm_movelh_ps(_mm_cvtpd_ps(a[0]), _mm_cvtpd_ps(a[1])),
+                _mm_movelh_ps(_mm_cvtpd_ps(a[2]), _mm_cvtpd_ps(a[3])),
+            ]
+        }
+    }
+}
+
+impl Simd for Avx2 {
+    type F = __m256;
+    type I = __m256i;
+    type D = [__m256d; 2];
+
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self::F {
+        unsafe { _mm256_set1_ps(value) }
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self::F {
+        unsafe { _mm256_loadu_ps(from) }
+    }
+    #[inline(always)]
+    unsafe fn store(to: *mut f32, value: Self::F) {
+        unsafe { _mm256_storeu_ps(to, value) }
+    }
+    #[inline(always)]
+    unsafe fn add(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { _mm256_add_ps(a, b) }
+    }
+    #[inline(always)]
+    unsafe fn sub(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { _mm256_sub_ps(a, b) }
+    }
+    #[inline(always)]
+    unsafe fn mul(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { _mm256_mul_ps(a, b) }
+    }
+    #[inline(always)]
+    unsafe fn div(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { _mm256_div_ps(a, b) }
+    }
+    #[inline(always)]
+    unsafe fn sqrt(a: Self::F) -> Self::F {
+        unsafe { _mm256_sqrt_ps(a) }
+    }
+    #[inline(always)]
+    unsafe fn min(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { _mm256_min_ps(a, b) }
+    }
+    #[inline(always)]
+    unsafe fn max(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { _mm256_max_ps(a, b) }
+    }
+    #[inline(always)]
+    unsafe fn lt(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(a, b) }
+    }
+    #[inline(always)]
+    unsafe fn eq(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { _mm256_cmp_ps::<_CMP_EQ_OQ>(a, b) }
+    }
+    #[inline(always)]
+    unsafe fn and(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { _mm256_and_ps(a, b) }
+    }
+    #[inline(always)]
+    unsafe fn or(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { _mm256_or_ps(a, b) }
+    }
+    #[inline(always)]
+    unsafe fn xor(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { _mm256_xor_ps(a, b) }
+    }
+    #[inline(always)]
+    unsafe fn and_not(mask: Self::F, a: Self::F) -> Self::F {
+        unsafe { _mm256_andnot_ps(mask, a) }
+    }
+    #[inline(always)]
+    unsafe fn bits(mask: Self::F) -> u32 {
+        unsafe { _mm256_movemask_ps(mask) as u32 }
+    }
+
+    #[inline(always)]
+    unsafe fn load_i(from: *const i32) -> Self::I {
+        unsafe { _mm256_loadu_si256(from.cast()) }
+    }
+    #[inline(always)]
+    unsafe fn store_i(to: *mut i32, value: Self::I) {
+        unsafe { _mm256_storeu_si256(to.cast(), value) }
+    }
+    #[inline(always)]
+    unsafe fn splat_i(value: i32) -> Self::I {
+        unsafe { _mm256_set1_epi32(value) }
+    }
+    #[inline(always)]
+    unsafe fn add_i(a: Self::I, b: Self::I) -> Self::I {
+        unsafe { _mm256_add_epi32(a, b) }
+    }
+    #[inline(always)]
+    unsafe fn sub_i(a: Self::I, b: Self::I) -> Self::I {
+        unsafe { _mm256_sub_epi32(a, b) }
+    }
+    #[inline(always)]
+    unsafe fn prefix_sum_i(a: Self::I) -> Self::I {
+        unsafe {
+            let a = _mm256_add_epi32(a, _mm256_slli_si256::<4>(a));
+            let a = _mm256_add_epi32(a, _mm256_slli_si256::<8>(a));
+            // The low half's total, for the high half.
+            let totals = _mm256_shuffle_epi32::<0xff>(a);
+            _mm256_add_epi32(a, _mm256_permute2x128_si256::<0x08>(totals, totals))
+        }
+    }
+    #[inline(always)]
+    unsafe fn last_i(a: Self::I) -> Self::I {
+        unsafe { _mm256_permutevar8x32_epi32(a, _mm256_set1_epi32(7)) }
+    }
+    #[inline(always)]
+    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
+        unsafe { _mm256_blendv_epi8(no, yes, _mm256_castps_si256(Self::mask(lanes))) }
+    }
+    #[inline(always)]
+    unsafe fn round_i(a: Self::F) -> Self::I {
+        unsafe { _mm256_cvtps_epi32(a) }
+    }
+    #[inline(always)]
+    unsafe fn truncate_i(a: Self::F) -> Self::I {
+        unsafe { _mm256_cvttps_epi32(a) }
+    }
+    #[inline(always)]
+    unsafe fn float_i(a: Self::I) -> Self::F {
+        unsafe { _mm256_cvtepi32_ps(a) }
+    }
+
+    #[inline(always)]
+    unsafe fn splat_d(value: f64) -> Self::D {
+        unsafe { [_mm256_set1_pd(value); 2] }
+    }
+    #[inline(always)]
+    unsafe fn load_d(from: *const f64) -> Self::D {
+        unsafe { [_mm256_loadu_pd(from), _mm256_loadu_pd(from.add(4))] }
+    }
+    #[inline(always)]
+    unsafe fn store_d(to: *mut f64, value: Self::D) {
+        unsafe {
+            _mm256_storeu_pd(to, value[0]);
+            _mm256_storeu_pd(to.add(4), value[1]);
+        }
+    }
+    #[inline(always)]
+    unsafe fn add_d(a: Self::D, b: Self::D) -> Self::D {
+        unsafe { each!(_mm256_add_pd, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn sub_d(a: Self::D, b: Self::D) -> Self::D {
+        unsafe { each!(_mm256_sub_pd, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn mul_d(a: Self::D, b: Self::D) -> Self::D {
+        unsafe { each!(_mm256_mul_pd, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn div_d(a: Self::D, b: Self::D) -> Self::D {
+        unsafe { each!(_mm256_div_pd, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D {
+        unsafe { each!(_mm256_max_pd, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn select_lt_d(a: Self::D, b: Self::D, yes: Self::D, no: Self::D) -> Self::D {
+        let mut lanes = no;
+        for i in 0..2 {
+            unsafe {
+                let mask = _mm256_cmp_pd::<_CMP_LT_OQ>(a[i], b[i]);
+                lanes[i] = _mm256_blendv_pd(no[i], yes[i], mask);
+            }
+        }
+        lanes
+    }
+    #[inline(always)]
+    unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32 {
+        unsafe {
+            let low = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a[0], b[0]));
+            let high = _mm256_movemask_pd(_mm256_cmp_pd::<_CMP_LT_OQ>(a[1], b[1]));
+            (low | high << 4) as u32
+        }
+    }
+    #[inline(always)]
+    unsafe fn select_bits_d(lanes: u32, yes: Self::D, no: Self::D) -> Self::D {
+        unsafe {
+            let mask = _mm256_castps_si256(Self::mask(lanes));
+            let low = _mm256_cvtepi32_epi64(_mm256_castsi256_si128(mask));
+            let high = _mm256_cvtepi32_epi64(_mm256_extracti128_si256::<1>(mask));
+            [
+                _mm256_blendv_pd(no[0], yes[0], _mm256_castsi256_pd(low)),
+                _mm256_blendv_pd(no[1], yes[1], _mm256_castsi256_pd(high)),
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
+        /// Four lanes: each gets the one before, then the one two before.
+        #[inline(always)]
+        unsafe fn half(a: __m256d) -> __m256d {
+            unsafe {
+                let low_half_up = _mm256_permute2f128_pd::<0x08>(a, a);
+                let a = _mm256_add_pd(a, _mm256_shuffle_pd::<0b0100>(low_half_up, a));
+                _mm256_add_pd(a, _mm256_permute2f128_pd::<0x08>(a, a))
+            }
+        }
+        unsafe {
+            let low = half(a[0]);
+            [low, _mm256_add_pd(half(a[1]), _mm256_permute4x64_pd::<0xff>(low))]
+        }
+    }
+    #[inline(always)]
+    unsafe fn last_d(a: Self::D) -> Self::D {
+        unsafe { [_mm256_permute4x64_pd::<0xff>(a[1]); 2] }
+    }
+    #[inline(always)]
+    unsafe fn widen(a: Self::F) -> Self::D {
+        unsafe {
+            [
+                _mm256_cvtps_pd(_mm256_castps256_ps128(a)),
+                _mm256_cvtps_pd(_mm256_extractf128_ps::<1>(a)),
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn narrow(a: Self::D) -> Self::F {
+        unsafe { _mm256_set_m128(_mm256_cvtpd_ps(a[1]), _mm256_cvtpd_ps(a[0])) }
+    }
+}

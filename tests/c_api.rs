@@ -1,0 +1,92 @@
+//! The C API as its users have it: `tests/c_api.c`, compiled as C99 and as C++ with every warning an error, linked
+//! with the shared and with the static library, run as a program.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// What a program that links `libiine.a` must link too; `cmake/iine-targets.cmake` has the same list.
+const STATIC_LIBRARIES: [&str; 7] =
+    ["-lgcc_s", "-lutil", "-lrt", "-lpthread", "-lm", "-ldl", "-lc"];
+
+/// The libraries that cargo built for this very test.
+fn library(name: &str) -> PathBuf {
+    let test = std::env::current_exe().expect("this test's path");
+    test.with_file_name(name)
+}
+
+fn compiler() -> cc::Tool {
+    let target = format!("{}-unknown-linux-gnu", std::env::consts::ARCH);
+    let host = "x86_64-unknown-linux-gnu";
+    let host = if Path::new("/lib64/ld-linux-x86-64.so.2").exists() { host } else { &target };
+    cc::Build::new().cargo_metadata(false).opt_level(1).target(&target).host(host).get_compiler()
+}
+
+/// Runs a program built for this test's platform, through cargo's runner if there is one.
+fn run(program: &Path, library_dir: &Path) {
+    let runner = format!("CARGO_TARGET_{}_UNKNOWN_LINUX_GNU_RUNNER", std::env::consts::ARCH);
+    let runner = std::env::var(runner.to_uppercase()).unwrap_or_default();
+    let mut words = runner.split_whitespace().map(PathBuf::from).chain([program.to_owned()]);
+    let mut command = Command::new(words.next().expect("at least the program"));
+    check(command.args(words).env("LD_LIBRARY_PATH", library_dir));
+}
+
+fn check(command: &mut Command) {
+    let output = command.output().expect("a command that starts");
+    assert!(
+        output.status.success(),
+        "{:?} {:?}: {}\n{}{}",
+        command.get_program(),
+        command.get_args().collect::<Vec<_>>(),
+        output.status,
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+}
+
+/// Compiles the program as `language`, links it as `link` says, and runs it.
+fn compile_and_run(name: &str, language: &[&str], link: impl FnOnce(&mut Command, &Path)) {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::create_dir_all(&directory).expect("a directory for the program");
+    let program = directory.join("c_api");
+    let mut command = compiler().to_command();
+    command
+        .args(language)
+        .args(["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-I"])
+        .arg(root.join("include"))
+        .arg(root.join("tests/c_api.c"))
+        .args(["-x", "none", "-o"])
+        .arg(&program);
+    link(&mut command, &directory);
+    check(&mut command);
+    run(&program, &directory);
+}
+
+/// Links the shared library under the name that its SONAME asks the loader for.
+fn shared(command: &mut Command, directory: &Path) {
+    let version = env!("CARGO_PKG_VERSION").split('.').collect::<Vec<_>>();
+    let abi = if version[0] == "0" { format!("0.{}", version[1]) } else { version[0].to_owned() };
+    let so = directory.join(format!("libiine.so.{abi}"));
+    std::fs::copy(library("libiine.so"), &so).expect("the shared library");
+    command.arg(so).arg("-lm");
+}
+
+const C99: [&str; 3] = ["-std=c99", "-x", "c"];
+const CPP: [&str; 3] = ["-std=c++14", "-x", "c++"];
+
+#[test]
+fn c99_with_the_shared_library() {
+    compile_and_run("c99-shared", &C99, shared);
+}
+
+#[test]
+fn c99_with_the_static_library() {
+    compile_and_run("c99-static", &C99, |command, _| {
+        command.arg(library("libiine.a")).args(STATIC_LIBRARIES);
+    });
+}
+
+#[test]
+fn cpp_with_the_shared_library() {
+    compile_and_run("cpp-shared", &CPP, shared);
+}

@@ -1,0 +1,261 @@
+//! Generated clouds and ways to compute and compare their normals, for the tests that hold the fast paths to the
+//! plain form.
+
+#![allow(dead_code)] // every test takes what it needs
+
+use iine::{BorderPolicy, Estimator, Isa, Method, Normals, Options, Points};
+
+/// Numbers that look random, the same for the same seed.
+pub struct Random(u64);
+
+impl Random {
+    pub fn new(seed: u64) -> Self {
+        Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1)
+    }
+
+    pub fn next(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 16
+    }
+
+    /// A whole number below `end`.
+    pub fn below(&mut self, end: usize) -> usize {
+        (self.next() % end as u64) as usize
+    }
+
+    /// A number from `low` up to `high`.
+    pub fn between(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * (self.next() % 0x100_0000) as f32 / 0x100_0000 as f32
+    }
+
+    pub fn pick<T: Copy>(&mut self, of: &[T]) -> T {
+        of[self.below(of.len())]
+    }
+}
+
+/// What a cloud is like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    Wavy,
+    Noisy,
+    Plane,
+    SteepPlane,
+    Steps,
+    NanPixels,
+    NanBlocks,
+    NanRows,
+    NanBorders,
+    XOrYNan,
+    Infinite,
+    Zeros,
+    NegativeZ,
+    Shifted,
+    Millimetres,
+}
+
+impl Kind {
+    pub const ALL: [Kind; 15] = [
+        Kind::Wavy,
+        Kind::Noisy,
+        Kind::Plane,
+        Kind::SteepPlane,
+        Kind::Steps,
+        Kind::NanPixels,
+        Kind::NanBlocks,
+        Kind::NanRows,
+        Kind::NanBorders,
+        Kind::XOrYNan,
+        Kind::Infinite,
+        Kind::Zeros,
+        Kind::NegativeZ,
+        Kind::Shifted,
+        Kind::Millimetres,
+    ];
+}
+
+/// An organized cloud.
+#[derive(Clone, Debug)]
+pub struct Cloud {
+    pub width: usize,
+    pub height: usize,
+    pub points: Vec<[f32; 3]>,
+}
+
+impl Cloud {
+    pub fn view(&self) -> Points<'_> {
+        Points::interleaved(self.points.as_flattened(), self.width, self.height, 3, 0).unwrap()
+    }
+
+    /// A cloud of the kind, the same for the same seed.
+    pub fn new(kind: Kind, width: usize, height: usize, seed: u64) -> Cloud {
+        let mut random = Random::new(seed);
+        let slope = match kind {
+            Kind::SteepPlane => 3.0,
+            _ => 0.6,
+        };
+        let [a, b] = [random.between(-slope, slope), random.between(-slope, slope)];
+        let wave = random.between(0.005, 0.02);
+        let is_plane = matches!(kind, Kind::Plane | Kind::SteepPlane);
+        let mut points = Vec::with_capacity(width * height);
+        for row in 0..height {
+            for column in 0..width {
+                let u = (column as f32 - width as f32 / 2.0) / 525.0;
+                let v = (row as f32 - height as f32 / 2.0) / 525.0;
+                let mut z = 1.2 / (1.0 - a * u - b * v);
+                if !is_plane {
+                    z += wave * (0.21 * column as f32).sin() * (0.17 * row as f32 + 0.5).cos();
+                }
+                if kind == Kind::Noisy {
+                    z += random.between(-0.003, 0.003);
+                }
+                if kind == Kind::Steps {
+                    z += 0.4 * ((column / 11 + row / 17) % 3) as f32;
+                }
+                points.push([u * z, v * z, z]);
+            }
+        }
+        let mut cloud = Cloud { width, height, points };
+        cloud.change(kind, &mut random);
+        cloud
+    }
+
+    fn change(&mut self, kind: Kind, random: &mut Random) {
+        let (width, height) = (self.width, self.height);
+        let pixels = width * height;
+        let nan = [f32::NAN; 3];
+        match kind {
+            Kind::NanPixels => {
+                for _ in 0..1 + pixels / 150 {
+                    self.points[random.below(pixels)] = nan;
+                }
+            }
+            Kind::NanBlocks => {
+                for _ in 0..1 + pixels / 800 {
+                    let (x, y) = (random.below(width), random.below(height));
+                    let (w, h) = (1 + random.below(9), 1 + random.below(9));
+                    self.fill(x..x + w, y..y + h, nan);
+                }
+            }
+            Kind::NanRows => {
+                let (x, y) = (random.below(width), random.below(height));
+                self.fill(0..width, y..y + 1, nan);
+                self.fill(x..x + 1, 0..height, nan);
+            }
+            Kind::NanBorders => {
+                let [left, right, up, down] = [(); 4].map(|()| random.below(3));
+                self.fill(0..left, 0..height, nan);
+                self.fill(width.saturating_sub(right)..width, 0..height, nan);
+                self.fill(0..width, 0..up, nan);
+                self.fill(0..width, height.saturating_sub(down)..height, nan);
+                // And single ones in the outermost rows and columns.
+                for _ in 0..2 {
+                    let along = random.below(width);
+                    self.points[along] = nan;
+                    self.points[pixels - 1 - random.below(width)] = nan;
+                    self.points[random.below(height) * width] = nan;
+                    self.points[random.below(height) * width + width - 1] = nan;
+                }
+            }
+            Kind::XOrYNan => {
+                for _ in 0..1 + pixels / 200 {
+                    let c = random.below(2);
+                    let value = random.pick(&[f32::NAN, f32::INFINITY]);
+                    self.points[random.below(pixels)][c] = value;
+                }
+            }
+            Kind::Infinite => {
+                for _ in 0..1 + pixels / 200 {
+                    let value = random.pick(&[f32::INFINITY, f32::NEG_INFINITY]);
+                    self.points[random.below(pixels)] = [value; 3];
+                }
+            }
+            Kind::Zeros => {
+                for _ in 0..1 + pixels / 300 {
+                    let (x, y) = (random.below(width), random.below(height));
+                    self.fill(x..x + 4, y..y + 3, [0.0; 3]);
+                }
+            }
+            Kind::NegativeZ => self.points.iter_mut().for_each(|p| p[2] = -p[2]),
+            Kind::Shifted => self.points.iter_mut().flatten().for_each(|c| *c += 100.0),
+            Kind::Millimetres => self.points.iter_mut().flatten().for_each(|c| *c *= 1000.0),
+            _ => {}
+        }
+    }
+
+    fn fill(
+        &mut self,
+        columns: std::ops::Range<usize>,
+        rows: std::ops::Range<usize>,
+        point: [f32; 3],
+    ) {
+        for y in rows.start..rows.end.min(self.height) {
+            for x in columns.start..columns.end.min(self.width) {
+                self.points[y * self.width + x] = point;
+            }
+        }
+    }
+}
+
+/// The methods with the border policies that they support.
+pub fn methods() -> impl Iterator<Item = (Method, BorderPolicy)> {
+    Method::ALL
+        .into_iter()
+        .flat_map(|method| BorderPolicy::ALL.map(|policy| (method, policy)))
+        .filter(|combination| *combination != (Method::Simple3DGradient, BorderPolicy::Mirror))
+}
+
+/// The instruction sets of the fast path that this processor has.
+pub fn fast_isas() -> impl Iterator<Item = Isa> {
+    Isa::ALL.into_iter().filter(|isa| *isa != Isa::Scalar && isa.is_available())
+}
+
+pub fn options(
+    (method, border_policy): (Method, BorderPolicy),
+    normal_smoothing_size: f32,
+    depth_dependent_smoothing: bool,
+) -> Options {
+    let mut options = Options::default();
+    options.method = method;
+    options.border_policy = border_policy;
+    options.normal_smoothing_size = normal_smoothing_size;
+    options.depth_dependent_smoothing = depth_dependent_smoothing;
+    options
+}
+
+/// nx, ny, nz, curvature of every pixel.
+pub fn compute(estimator: &mut Estimator, cloud: &Cloud) -> Vec<[f32; 4]> {
+    let mut found = vec![[7.0; 4]; cloud.width * cloud.height];
+    let data = found.as_flattened_mut();
+    let mut normals = Normals::interleaved(data, cloud.width, cloud.height, 4, 0, Some(3)).unwrap();
+    estimator.compute(&cloud.view(), &mut normals).unwrap();
+    found
+}
+
+/// The angle between two unit vectors in degrees, well conditioned also where it is small.
+pub fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
+    let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let sine = cross.iter().map(|c| c * c).sum::<f64>().sqrt();
+    let cosine = a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    sine.atan2(cosine).to_degrees()
+}
+
+/// The normal of a pixel in doubles, if it has one.
+pub fn normal(found: &[f32; 4]) -> Option<[f64; 3]> {
+    let normal = [found[0], found[1], found[2]].map(f64::from);
+    normal.iter().all(|c| c.is_finite()).then_some(normal)
+}
+
+/// Panics at the first pixel whose bits differ.
+pub fn assert_same_bits(a: &[[f32; 4]], b: &[[f32; 4]], width: usize, what: &str) {
+    assert_eq!(a.len(), b.len());
+    for (at, (a, b)) in a.iter().zip(b).enumerate() {
+        assert!(
+            a.map(f32::to_bits) == b.map(f32::to_bits),
+            "{what}: pixel {},{}: {a:?} and {b:?}",
+            at % width,
+            at / width
+        );
+    }
+}

@@ -1,0 +1,289 @@
+//! Every instruction set gives the same bits, and what the plain form gives within the rounding of the sums.
+
+mod clouds;
+
+use clouds::{Cloud, Kind, angle, assert_same_bits, compute, fast_isas, methods, normal, options};
+use iine::{Estimator, Isa, Method, Normals, Points};
+
+const SMOOTHING: [f32; 6] = [3.0, 5.0, 7.0, 10.0, 20.0, 40.0];
+
+/// The largest differences seen.
+#[derive(Debug, Default)]
+struct Worst {
+    angle: [f64; 4],
+    curvature: f32,
+    computations: usize,
+}
+
+/// Degrees that a normal may differ from the plain form's: in AVERAGE_3D_GRADIENT and SIMPLE_3D_GRADIENT by the
+/// rounding to integers (`strips.rs` asks the plain form where that could turn a normal by 1e-4), in
+/// AVERAGE_DEPTH_CHANGE by floats (likewise), in COVARIANCE_MATRIX by a hundredth of that.
+fn allowed(method: Method) -> f64 {
+    match method {
+        Method::CovarianceMatrix => 1e-3,
+        _ => 6e-3,
+    }
+}
+
+/// Cosine between a normal and its line of sight from which on the side is certain.
+const EDGE_ON: f64 = 1e-5;
+
+impl Worst {
+    fn check(&mut self, cloud: &Cloud, what: &str, options: &iine::Options) {
+        let plain = compute(&mut Estimator::with_isa(options.clone(), Isa::Scalar), cloud);
+        let mut first: Option<Vec<[f32; 4]>> = None;
+        for isa in fast_isas() {
+            let found = compute(&mut Estimator::with_isa(options.clone(), isa), cloud);
+            self.computations += 1;
+            match &first {
+                Some(first) => assert_same_bits(
+                    first,
+                    &found,
+                    cloud.width,
+                    &format!("{isa:?} and portable, {what}, {options:?}"),
+                ),
+                None => first = Some(found),
+            }
+        }
+        let fast = first.expect("the portable path is always there");
+        for (at, (fast, plain)) in fast.iter().zip(&plain).enumerate() {
+            let place = || {
+                let (x, y) = (at % cloud.width, at / cloud.width);
+                format!("{what} pixel {x},{y}: {fast:?}, plain {plain:?}; {options:?}")
+            };
+            assert_eq!(fast.map(f32::is_nan), plain.map(f32::is_nan), "{}", place());
+            if let (Some(a), Some(b)) = (normal(fast), normal(plain)) {
+                let mut degrees = angle(a, b);
+                let point = cloud.points[at].map(f64::from);
+                let length = point.iter().map(|c| c * c).sum::<f64>().sqrt();
+                let cosine = a.iter().zip(point).map(|(n, p)| n * p).sum::<f64>() / length;
+                if cosine.abs() < EDGE_ON {
+                    degrees = degrees.min(180.0 - degrees);
+                }
+                let worst = &mut self.angle[options.method as usize];
+                *worst = worst.max(degrees);
+                assert!(degrees <= allowed(options.method), "{degrees} deg, {}", place());
+            }
+            if !fast[3].is_nan() {
+                let difference = (fast[3] - plain[3]).abs();
+                self.curvature = self.curvature.max(difference);
+                assert!(difference <= 1e-5, "curvature, {}", place());
+            }
+        }
+    }
+}
+
+#[test]
+fn all_sizes_equal_the_plain_form() {
+    let mut worst = Worst::default();
+    let mut kinds = Kind::ALL.into_iter().cycle();
+    let mut seed = 0;
+    for width in (1..=40).chain(63..=66) {
+        for height in [1, 2, 3, 5, 8, 13, 24, 41] {
+            // Walking over windows as large as the image takes long, so not every size meets every option.
+            let every = if width * height > 250 { 9 } else { 2 };
+            for method in methods() {
+                for smoothing in SMOOTHING {
+                    for depth_dependent in [false, true] {
+                        seed += 1;
+                        let kind = kinds.next().expect("without end");
+                        if seed % every != 0 {
+                            continue;
+                        }
+                        let cloud = Cloud::new(kind, width, height, seed);
+                        let what = format!("{kind:?} {width}x{height} seed {seed}");
+                        worst.check(&cloud, &what, &options(method, smoothing, depth_dependent));
+                    }
+                }
+            }
+        }
+    }
+    println!("{worst:?}");
+}
+
+#[test]
+fn every_kind_equals_the_plain_form() {
+    let mut worst = Worst::default();
+    for (seed, kind) in (0..).zip(Kind::ALL) {
+        let cloud = Cloud::new(kind, 77, 53, seed);
+        for method in methods() {
+            for smoothing in SMOOTHING {
+                for depth_dependent in [false, true] {
+                    let options = options(method, smoothing, depth_dependent);
+                    worst.check(&cloud, &format!("{kind:?}"), &options);
+                }
+            }
+        }
+    }
+    println!("{worst:?}");
+}
+
+/// Several tiles and many groups a row.
+#[test]
+fn wide_clouds_equal_the_plain_form() {
+    let mut worst = Worst::default();
+    for (seed, kind) in (100..).zip([Kind::Wavy, Kind::NanBlocks, Kind::Steps, Kind::Shifted]) {
+        for (height, smoothing) in [(3, 3.0), (45, 10.0), (135, 5.0)] {
+            let cloud = Cloud::new(kind, 640, height, seed);
+            for method in methods() {
+                let options = options(method, smoothing, seed % 2 == 0);
+                worst.check(&cloud, &format!("{kind:?}"), &options);
+            }
+        }
+    }
+    println!("{worst:?}");
+}
+
+const CANARY: f32 = -12345.5;
+
+/// The cloud in an array of points of `stride` floats, rows `row` floats apart.
+fn laid_out(cloud: &Cloud, stride: usize, row: usize) -> Vec<f32> {
+    let mut data = vec![f32::NAN; row * cloud.height];
+    for (at, point) in cloud.points.iter().enumerate() {
+        let start = at / cloud.width * row + at % cloud.width * stride;
+        data[start..start + 3].copy_from_slice(point);
+    }
+    data
+}
+
+#[test]
+fn layouts_of_points_do_not_matter() {
+    for (width, height) in [(67, 29), (16, 9), (3, 3)] {
+        let cloud = Cloud::new(Kind::NanBlocks, width, height, 5);
+        for method in methods() {
+            let options = options(method, 5.0, true);
+            for isa in fast_isas().chain([Isa::Scalar]) {
+                let mut estimator = Estimator::with_isa(options.clone(), isa);
+                let expected = compute(&mut estimator, &cloud);
+                let mut check = |points: &Points, what: &str| {
+                    let mut found = vec![[7.0; 4]; width * height];
+                    let data = found.as_flattened_mut();
+                    let mut normals =
+                        Normals::interleaved(data, width, height, 4, 0, Some(3)).unwrap();
+                    estimator.compute(points, &mut normals).unwrap();
+                    assert_same_bits(&found, &expected, width, &format!("{isa:?} {what}"));
+                };
+                for stride in [3, 4, 5, 8] {
+                    for padding in [0, 1, 7] {
+                        let row = width * stride + padding;
+                        let data = laid_out(&cloud, stride, row);
+                        // Not one float more than needed: the last point ends the buffer.
+                        let end = data.len() - padding - (stride - 3);
+                        let data = data[..end].to_vec().into_boxed_slice();
+                        let points =
+                            Points::interleaved(&data, width, height, stride, row).unwrap();
+                        check(&points, &format!("stride {stride}, padding {padding}"));
+                    }
+                }
+                for padding in [0, 3] {
+                    let row = width + padding;
+                    let planes = [0, 1, 2].map(|c| {
+                        let mut plane = vec![f32::NAN; row * height - padding];
+                        for (at, point) in cloud.points.iter().enumerate() {
+                            plane[at / width * row + at % width] = point[c];
+                        }
+                        plane
+                    });
+                    let [x, y, z] = &planes;
+                    let points = Points::planes([x, y, z], width, height, row).unwrap();
+                    check(&points, &format!("planes, padding {padding}"));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn other_bytes_of_the_output_stay() {
+    for (width, height) in [(67, 29), (16, 9), (3, 3)] {
+        let cloud = Cloud::new(Kind::NanBlocks, width, height, 6);
+        for method in methods() {
+            let options = options(method, 5.0, false);
+            for isa in fast_isas().chain([Isa::Scalar]) {
+                let mut estimator = Estimator::with_isa(options.clone(), isa);
+                let expected = compute(&mut estimator, &cloud);
+                for (stride, curvature) in
+                    [(3, None), (4, None), (4, Some(3)), (5, Some(3)), (8, Some(4)), (8, None)]
+                {
+                    for padding in [0, 5] {
+                        let row = width * stride + padding;
+                        let mut data = vec![CANARY; row * height];
+                        let mut normals =
+                            Normals::interleaved(&mut data, width, height, stride, row, curvature)
+                                .unwrap();
+                        estimator.compute(&cloud.view(), &mut normals).unwrap();
+                        for (at, value) in data.into_iter().enumerate() {
+                            let (y, in_row) = (at / row, at % row);
+                            let (x, field) = (in_row / stride, in_row % stride);
+                            let expected = match field {
+                                _ if x >= width => CANARY,
+                                0..3 => expected[y * width + x][field],
+                                _ if Some(field) == curvature => expected[y * width + x][3],
+                                _ => CANARY,
+                            };
+                            assert_eq!(
+                                value.to_bits(),
+                                expected.to_bits(),
+                                "{isa:?} stride {stride}, padding {padding}, float {at}"
+                            );
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Points and normals as disjoint fields of one array, as in `pcl::PointNormal`, packed, and with rows padded.
+#[test]
+fn points_and_normals_may_share_an_array() {
+    let (width, height) = (67, 29);
+    let cloud = Cloud::new(Kind::NanPixels, width, height, 7);
+    for method in methods() {
+        let options = options(method, 7.0, false);
+        for isa in fast_isas().chain([Isa::Scalar]) {
+            let mut estimator = Estimator::with_isa(options.clone(), isa);
+            let expected = compute(&mut estimator, &cloud);
+            // Floats a point, first floats of the normal and the curvature, floats after a row.
+            for (stride, first, curvature, padding) in
+                [(12, 4, 8, 0), (7, 3, 6, 0), (8, 3, 7, 2), (9, 6, 3, 4)]
+            {
+                let row = width * stride + padding;
+                let mut data = laid_out(&cloud, stride, row);
+                let before = data.clone();
+                let base = data.as_mut_ptr();
+                let place = |field: usize| base.wrapping_add(field);
+                let strides = [4 * stride, 4 * row];
+                // SAFETY: the array outlives both views and is not touched but through them meanwhile; their
+                // fields are inside it, and disjoint.
+                unsafe {
+                    let from = [0, 1, 2].map(|c| place(c).cast_const());
+                    let points =
+                        Points::from_raw(from, width, height, strides[0], strides[1]).unwrap();
+                    let to = [0, 1, 2].map(|c| place(first + c));
+                    let curvature = Some((place(curvature), strides));
+                    let mut normals =
+                        Normals::from_raw(to, width, height, strides, curvature).unwrap();
+                    estimator.compute(&points, &mut normals).unwrap();
+                }
+                for (at, (value, before)) in data.into_iter().zip(before).enumerate() {
+                    let (y, in_row) = (at / row, at % row);
+                    let (x, field) = (in_row / stride, in_row % stride);
+                    let expected = match field {
+                        _ if x >= width => before,
+                        _ if (first..first + 3).contains(&field) => {
+                            expected[y * width + x][field - first]
+                        }
+                        _ if field == curvature => expected[y * width + x][3],
+                        _ => before,
+                    };
+                    assert_eq!(
+                        value.to_bits(),
+                        expected.to_bits(),
+                        "{isa:?} stride {stride}, float {at}"
+                    );
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! The normals against a slow, obvious computation in doubles: over each pixel's window, whose side the maps tell, no
+//! integral images, nalgebra for the eigenvectors. Generated clouds, and real frames where `IINE_TEST_DATA` has them.
+
+mod clouds;
+
+use std::path::PathBuf;
+
+use clouds::{Cloud, Kind, angle, compute, methods, normal, options};
+use iine::{BorderPolicy, Estimator, Maps, Method, Options};
+use iine_scenes::Pcd;
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+
+/// What the reference says of a pixel.
+struct Expected {
+    normal: Vector3<f64>,
+    curvature: Option<f64>,
+}
+
+/// A plane is defined where the middle eigenvalue is this many times the smallest.
+const DEFINED: f64 = 1.01;
+
+/// The reference for pixel (x, y) with a window of `side`; none where it has nothing to say: the window crosses the
+/// border of the image, or its points define no plane.
+fn reference(
+    cloud: &Cloud,
+    method: Method,
+    (x, y): (usize, usize),
+    side: usize,
+) -> Option<Expected> {
+    let half = side / 2;
+    let reach = half + 2;
+    if x < reach || y < reach || x + reach >= cloud.width || y + reach >= cloud.height {
+        return None;
+    }
+    let at = |x: usize, y: usize| {
+        let point = Vector3::from(cloud.points[y * cloud.width + x].map(f64::from));
+        point.iter().all(|c| c.is_finite()).then_some(point)
+    };
+    let (left, top) = (x - half, y - half);
+    let tangents = |horizontal: Vector3<f64>, vertical: Vector3<f64>| {
+        let sine = horizontal.cross(&vertical).norm() / (horizontal.norm() * vertical.norm());
+        // A thousandth of a degree between the tangents: no plane.
+        (sine > 2e-5)
+            .then(|| Expected { normal: horizontal.cross(&vertical).normalize(), curvature: None })
+    };
+    match method {
+        Method::CovarianceMatrix => {
+            let points: Vec<Vector3<f64>> = (top..top + side)
+                .flat_map(|y| (left..left + side).filter_map(move |x| at(x, y)))
+                .collect();
+            let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+            let mut matrix = Matrix3::zeros();
+            for point in &points {
+                let d = point - mean;
+                matrix += d * d.transpose();
+            }
+            let eigen = SymmetricEigen::new(matrix);
+            let mut order = [0, 1, 2];
+            order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+            let [smallest, middle, largest] = order.map(|i| eigen.eigenvalues[i]);
+            // Doubles cannot tell the direction of a line's normal; a single place has none.
+            if middle < DEFINED * smallest || middle <= 1e-9 * largest {
+                return None;
+            }
+            let normal = eigen.eigenvectors.column(order[0]).into_owned();
+            Some(Expected { normal, curvature: Some(smallest.max(0.0) / matrix.trace()) })
+        }
+        Method::Average3DGradient => {
+            let (mut horizontal, mut vertical) = (Vector3::zeros(), Vector3::zeros());
+            for y in top..top + side {
+                for x in left..left + side {
+                    if let (Some(a), Some(b)) = (at(x + 1, y), at(x - 1, y)) {
+                        horizontal += a - b;
+                    }
+                    if let (Some(a), Some(b)) = (at(x, y + 1), at(x, y - 1)) {
+                        vertical += a - b;
+                    }
+                }
+            }
+            tangents(horizontal, vertical)
+        }
+        Method::AverageDepthChange => {
+            let quarter = side / 4;
+            let mean_z = |left: usize, top: usize| {
+                let (mut sum, mut count) = (0.0, 0.0);
+                for y in top..top + half {
+                    for x in left..left + half {
+                        let z = f64::from(cloud.points[y * cloud.width + x][2]);
+                        if z.is_finite() {
+                            sum += z;
+                            count += 1.0;
+                        }
+                    }
+                }
+                sum / count
+            };
+            // Windows of 3 are rounded as PCL rounds them.
+            if half == 1 {
+                return None;
+            }
+            let mut horizontal = at(x + quarter + 1, y)? - at(x - quarter - 1, y)?;
+            let mut vertical = at(x + 1, y + quarter)? - at(x - 1, y - quarter)?;
+            horizontal.z = mean_z(x + 1, y - quarter) - mean_z(left, y - quarter);
+            vertical.z = mean_z(x - quarter, y + 1) - mean_z(x - quarter, top);
+            tangents(horizontal, vertical)
+        }
+        Method::Simple3DGradient => {
+            let (right, bottom) = (x + half, y + half);
+            let column = |x| (top..top + side).filter_map(|y| at(x, y)).sum::<Vector3<f64>>();
+            let row = |y| (left..left + side).filter_map(|x| at(x, y)).sum::<Vector3<f64>>();
+            tangents(column(right) - column(left), row(bottom) - row(top))
+        }
+        _ => None,
+    }
+}
+
+/// How far normals and curvatures were from the reference.
+#[derive(Default)]
+struct Differences {
+    angles: Vec<f64>,
+    curvature: f64,
+    wrong_side: usize,
+    missing: usize,
+}
+
+impl Differences {
+    /// Compares every `step`-th pixel.
+    fn add(&mut self, cloud: &Cloud, options: &Options, step: usize) {
+        let mut estimator = Estimator::new(options.clone());
+        let found = compute(&mut estimator, cloud);
+        let mut sides = vec![0.0; cloud.points.len()];
+        let mut maps = Maps { smoothing_areas: Some(&mut sides), ..Maps::default() };
+        estimator.compute_maps(&cloud.view(), &mut maps).unwrap();
+        for at in (0..found.len()).step_by(step) {
+            if sides[at] == 0.0 {
+                assert!(found[at].iter().all(|c| c.is_nan()), "a normal without a window");
+                continue;
+            }
+            let pixel = (at % cloud.width, at / cloud.width);
+            let Some(expected) = reference(cloud, options.method, pixel, sides[at] as usize) else {
+                continue;
+            };
+            let Some(normal) = normal(&found[at]) else {
+                self.missing += 1;
+                continue;
+            };
+            let degrees = angle(normal, expected.normal.into());
+            self.angles.push(degrees.min(180.0 - degrees));
+            if let Some(curvature) = expected.curvature {
+                self.curvature = self.curvature.max((f64::from(found[at][3]) - curvature).abs());
+            }
+            let point = Vector3::from(cloud.points[at].map(f64::from));
+            let viewpoint = Vector3::from(options.viewpoint.map(f64::from));
+            let towards = (viewpoint - point).normalize().dot(&Vector3::from(normal));
+            if towards < -1e-6 {
+                self.wrong_side += 1;
+            }
+        }
+    }
+
+    fn check(&mut self, what: &str, method: Method) {
+        if self.angles.is_empty() {
+            return;
+        }
+        self.angles.sort_by(f64::total_cmp);
+        let percentile = |p: f64| self.angles[((self.angles.len() - 1) as f64 * p) as usize];
+        let (p999, worst) = (percentile(0.999), percentile(1.0));
+        println!(
+            "{what}: {} normals, p50 {:.1e}, p99.9 {p999:.1e}, largest {worst:.1e} deg, curvature {:.1e}, \
+             no normal {}",
+            self.angles.len(),
+            percentile(0.5),
+            self.curvature,
+            self.missing,
+        );
+        let allowed = if method == Method::CovarianceMatrix { 0.001 } else { 0.01 };
+        assert!(p999 <= allowed, "{what}: {p999} deg at p99.9");
+        assert!(self.curvature <= 1e-5, "{what}: curvature {}", self.curvature);
+        assert_eq!(self.wrong_side, 0, "{what}: turned away from the viewpoint");
+        assert_eq!(self.missing, 0, "{what}: no normal");
+    }
+}
+
+#[test]
+fn generated_clouds_match_the_reference() {
+    for (seed, kind) in (0..).zip(Kind::ALL) {
+        let cloud = Cloud::new(kind, 121, 93, seed);
+        for method in methods() {
+            let mut differences = Differences::default();
+            for smoothing in [3.0, 5.0, 7.0, 10.0, 20.0] {
+                for depth_dependent in [false, true] {
+                    if kind == Kind::Millimetres && depth_dependent {
+                        continue; // windows of a hundred pixels
+                    }
+                    differences.add(&cloud, &options(method, smoothing, depth_dependent), 1);
+                }
+            }
+            differences.check(&format!("{kind:?} {method:?}"), method.0);
+        }
+    }
+}
+
+#[test]
+fn planes_at_all_tilts_match_the_reference() {
+    for method in methods() {
+        let mut differences = Differences::default();
+        for seed in 0..60 {
+            let kind = if seed % 2 == 0 { Kind::Plane } else { Kind::SteepPlane };
+            let cloud = Cloud::new(kind, 48, 40, seed);
+            differences.add(&cloud, &options(method, 9.0, false), 1);
+        }
+        differences.check(&format!("planes {method:?}"), method.0);
+    }
+}
+
+const FRAMES: [&str; 6] = [
+    "kinect_capture0001",
+    "milk_cartoon_all_small_clorox",
+    "office1",
+    "ouster_os1_128",
+    "realsense_d435",
+    "table_scene_mug_stereo_textured",
+];
+
+#[test]
+fn real_frames_match_the_reference() {
+    let folder = std::env::var_os("IINE_TEST_DATA").map_or_else(
+        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        PathBuf::from,
+    );
+    for name in FRAMES {
+        let path = folder.join(name).with_extension("pcd");
+        if !path.exists() {
+            println!("skipped: real_frames_match_the_reference, {name}: no {}", path.display());
+            continue;
+        }
+        let pcd = Pcd::read(&path).unwrap();
+        let cloud = Cloud { width: pcd.width, height: pcd.height, points: pcd.points };
+        for method in methods() {
+            for (smoothing, depth_dependent, step) in
+                [(10.0, true, 3), (5.0, false, 7), (20.0, true, 23)]
+            {
+                // Away from the border both policies are the same.
+                if method.1 == BorderPolicy::Mirror && smoothing > 5.0 {
+                    continue;
+                }
+                let mut differences = Differences::default();
+                differences.add(&cloud, &options(method, smoothing, depth_dependent), step);
+                differences.check(&format!("{name} {method:?} smoothing {smoothing}"), method.0);
+            }
+        }
+    }
+}

@@ -1,0 +1,195 @@
+//! What does not depend on the number of threads, on the choice of pixels, or on the frames before: the normals. And
+//! what scratch memory does.
+
+mod clouds;
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
+
+use clouds::{Cloud, Kind, Random, assert_same_bits, compute, fast_isas, methods, options};
+use iine::{BorderPolicy, Estimator, Isa, Method, Normals};
+
+thread_local! {
+    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+}
+
+/// Counts what each thread asks for.
+struct Counting;
+
+// SAFETY: everything is the system allocator's.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        // A thread that ends may ask after its counter is gone.
+        let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
+        // SAFETY: as the caller's.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        // SAFETY: as the caller's.
+        unsafe { System.dealloc(at, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn the_number_of_threads_does_not_matter() {
+    for (kind, width, height) in [
+        (Kind::NanBlocks, 200, 150),
+        (Kind::Steps, 641, 333),
+        (Kind::XOrYNan, 97, 260),
+        (Kind::Wavy, 35, 400),
+    ] {
+        let cloud = Cloud::new(kind, width, height, 11);
+        for method in methods() {
+            for depth_dependent in [false, true] {
+                for smoothing in [5.0, 10.0, 20.0] {
+                    let mut options = options(method, smoothing, depth_dependent);
+                    options.threads = 1;
+                    let one = compute(&mut Estimator::new(options.clone()), &cloud);
+                    for threads in [2, 3, 7] {
+                        options.threads = threads;
+                        let found = compute(&mut Estimator::new(options.clone()), &cloud);
+                        let what = format!("{kind:?} {options:?}");
+                        assert_same_bits(&found, &one, width, &what);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The indices' normals, by the estimator, in an array of their own.
+fn listed(estimator: &mut Estimator, cloud: &Cloud, indices: &[i32]) -> Vec<[f32; 4]> {
+    let mut found = vec![[7.0; 4]; indices.len()];
+    let data = found.as_flattened_mut();
+    let mut normals = Normals::interleaved(data, indices.len(), 1, 4, 0, Some(3)).unwrap();
+    estimator.compute_indices(&cloud.view(), indices, &mut normals).unwrap();
+    found
+}
+
+#[test]
+fn listed_pixels_get_what_the_whole_cloud_gives_them() {
+    let mut random = Random::new(12);
+    for (kind, width, height) in
+        [(Kind::NanPixels, 97, 61), (Kind::XOrYNan, 300, 140), (Kind::Wavy, 2, 9)]
+    {
+        let cloud = Cloud::new(kind, width, height, 13);
+        let pixels = width * height;
+        let mut permuted: Vec<i32> = (0..pixels as i32).collect();
+        for at in (1..pixels).rev() {
+            permuted.swap(at, random.below(at + 1));
+        }
+        let sparse = permuted[..pixels.div_ceil(50)].to_vec();
+        let repeated: Vec<i32> =
+            (0..pixels).map(|_| permuted[random.below(pixels.min(40))]).collect();
+        let one = vec![permuted[0]];
+        let last = vec![pixels as i32 - 1, 0, pixels as i32 - 1];
+        for method in methods() {
+            for isa in fast_isas().chain([Isa::Scalar]) {
+                for threads in [1, 3] {
+                    let mut options = options(method, 7.0, true);
+                    options.threads = threads;
+                    let mut estimator = Estimator::with_isa(options.clone(), isa);
+                    let all = compute(&mut estimator, &cloud);
+                    for indices in [&permuted, &sparse, &repeated, &one, &last] {
+                        if isa == Isa::Scalar && indices.len() > 2000 {
+                            continue;
+                        }
+                        let found = listed(&mut estimator, &cloud, indices);
+                        let expected: Vec<_> = indices.iter().map(|i| all[*i as usize]).collect();
+                        let what = format!("{isa:?} {kind:?} {options:?}");
+                        assert_same_bits(&found, &expected, width, &what);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn frames_before_do_not_matter() {
+    let mut random = Random::new(14);
+    let combinations: Vec<_> = methods().collect();
+    let mut reused = Estimator::new(options(combinations[0], 10.0, false));
+    for seed in 0..150 {
+        let (width, height) = (1 + random.below(300), 1 + random.below(120));
+        let cloud = Cloud::new(random.pick(&Kind::ALL), width, height, seed);
+        let smoothing = random.pick(&[3.0, 8.0, 15.0]);
+        let mut options = options(random.pick(&combinations), smoothing, seed % 2 == 0);
+        options.threads = random.pick(&[1, 1, 2]);
+        *reused.options_mut() = options.clone();
+        let found = compute(&mut reused, &cloud);
+        let fresh = compute(&mut Estimator::new(options), &cloud);
+        assert_same_bits(&found, &fresh, width, &format!("frame {seed}"));
+    }
+}
+
+/// The method that needs the most memory.
+const LARGEST_RINGS: (Method, BorderPolicy) = (Method::CovarianceMatrix, BorderPolicy::Ignore);
+
+/// At most 8 bytes a pixel and 48 rows of 96 bytes a pixel.
+#[test]
+fn scratch_memory_is_small_and_stays() {
+    let sizes: &[(usize, usize)] = &[(64, 48), (640, 480), (4096, 3072)];
+    for &(width, height) in sizes {
+        let cloud = Cloud::new(Kind::NanBlocks, width, height, 15);
+        let mut found = vec![[0.0; 4]; width * height];
+        for method in methods() {
+            for smoothing in [10.0, 20.0] {
+                // The largest size with the default smoothing only: its cost is in time, and the bound's is here.
+                if width > 1000 && (smoothing > 10.0 || method != LARGEST_RINGS) {
+                    continue;
+                }
+                for threads in if width > 1000 { 1..2 } else { 1..3 } {
+                    let mut options = options(method, smoothing, false);
+                    options.threads = threads;
+                    let mut estimator = Estimator::new(options);
+                    assert_eq!(estimator.scratch_size(), 0);
+                    let mut frame = || {
+                        let data = found.as_flattened_mut();
+                        let mut normals =
+                            Normals::interleaved(data, width, height, 4, 0, Some(3)).unwrap();
+                        let before = ALLOCATIONS.with(Cell::get);
+                        estimator.compute(&cloud.view(), &mut normals).unwrap();
+                        (estimator.scratch_size(), ALLOCATIONS.with(Cell::get) - before)
+                    };
+                    let (first, _) = frame();
+                    let (second, allocations) = frame();
+                    let rows =
+                        first.saturating_sub(8 * width * height) as f64 / (96 * width) as f64;
+                    println!(
+                        "{width}x{height} {method:?} smoothing {smoothing} threads {threads}: {first} bytes, {:.2} \
+                         a pixel; beyond 8 a pixel {rows:.1} rows",
+                        first as f64 / (width * height) as f64,
+                    );
+                    if threads == 1 {
+                        assert_eq!(first, second, "{method:?}: grew at the second frame");
+                        assert_eq!(allocations, 0, "{method:?}: the second frame allocates");
+                    }
+                    // A tile's rings have a least size, which in tiny frames is more than their rows.
+                    let most = 8 * width * height + 48 * width.max(640) * 96 * threads;
+                    assert!(first.max(second) <= most, "{method:?}: {first}, {second} > {most}");
+                    estimator.release_scratch();
+                    assert_eq!(estimator.scratch_size(), 0);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn released_scratch_comes_back() {
+    let cloud = Cloud::new(Kind::Wavy, 100, 80, 16);
+    for threads in [1, 2] {
+        let mut options = options((Method::CovarianceMatrix, BorderPolicy::Mirror), 8.0, false);
+        options.threads = threads;
+        let mut estimator = Estimator::new(options);
+        let before = compute(&mut estimator, &cloud);
+        estimator.release_scratch();
+        let after = compute(&mut estimator, &cloud);
+        assert_same_bits(&before, &after, cloud.width, "after release");
+    }
+}
