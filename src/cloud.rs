@@ -504,6 +504,7 @@ fn prefetch_for_writing(at: *mut f32, point_stride: usize) {
 }
 
 /// How far ahead lines are asked for; found by trying 16 to 128 on 640x480.
+#[cfg(target_arch = "x86_64")]
 const PIXELS_AHEAD: usize = 48;
 
 /// Stores the first two floats.
