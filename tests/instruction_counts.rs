@@ -23,13 +23,13 @@ const HEIGHT: usize = 480;
 
 /// Instructions a pixel at most: with AVX2, with SSE2.
 const BOUNDS: [(Method, BorderPolicy, u64, u64); 7] = [
-    (Method::CovarianceMatrix, BorderPolicy::Ignore, 1, 1),
-    (Method::CovarianceMatrix, BorderPolicy::Mirror, 1, 1),
-    (Method::Average3DGradient, BorderPolicy::Ignore, 1, 1),
-    (Method::Average3DGradient, BorderPolicy::Mirror, 1, 1),
-    (Method::AverageDepthChange, BorderPolicy::Ignore, 1, 1),
-    (Method::AverageDepthChange, BorderPolicy::Mirror, 1, 1),
-    (Method::Simple3DGradient, BorderPolicy::Ignore, 1, 1),
+    (Method::CovarianceMatrix, BorderPolicy::Ignore, 229, 483),
+    (Method::CovarianceMatrix, BorderPolicy::Mirror, 372, 570),
+    (Method::Average3DGradient, BorderPolicy::Ignore, 117, 193),
+    (Method::Average3DGradient, BorderPolicy::Mirror, 190, 252),
+    (Method::AverageDepthChange, BorderPolicy::Ignore, 135, 209),
+    (Method::AverageDepthChange, BorderPolicy::Mirror, 289, 343),
+    (Method::Simple3DGradient, BorderPolicy::Ignore, 113, 186),
 ];
 
 fn main() -> ExitCode {

@@ -194,28 +194,36 @@ prepare (Estimation& estimation, int method, bool mirror, float size)
   estimation.setDepthDependentSmoothing (DEPTH_DEPENDENT);
 }
 
-// Returns the angle's p99.9; masks must be identical.
-double
-compare (const std::string& what, const Normals& a, const Normals& b)
+// What two outputs come to.
+struct Comparison
+{
+  double p999;            // of the angle, in degrees
+  std::size_t only_first; // pixels that have a normal in the first only
+};
+
+// Masks must be identical, but that the first may have `allowed` normals more.
+Comparison
+compare (const std::string& what, const Normals& a, const Normals& b, std::size_t allowed)
 {
   if (a.size () != b.size ())
     fail (what + ": sizes differ");
   std::vector<double> angles;
-  std::size_t different = 0;
+  std::size_t only_first = 0, only_second = 0;
   for (std::size_t i = 0; i < a.size (); ++i)
   {
     const Eigen::Vector3d u = a[i].getNormalVector3fMap ().cast<double> ();
     const Eigen::Vector3d v = b[i].getNormalVector3fMap ().cast<double> ();
     if (u.allFinite () != v.allFinite ())
-      ++different;
+      ++(u.allFinite () ? only_first : only_second);
     else if (u.allFinite ())
       angles.push_back (std::atan2 (u.cross (v).norm (), u.dot (v)) * 180.0 / M_PI);
   }
-  if (different != 0)
-    fail (what + ": " + std::to_string (different) + " pixels have a normal from one only");
+  if (only_first > allowed || only_second > 0)
+    fail (what + ": pixels that have a normal from one only: " + std::to_string (only_first) + " and " +
+          std::to_string (only_second));
   if (angles.size () < a.size () / 8)
     fail (what + ": hardly a normal");
-  return quantile (angles, 0.999);
+  return {quantile (angles, 0.999), only_first};
 }
 
 // The same as benches/common/mod.rs: what is seen around a pixel does not depend on the size.
@@ -277,7 +285,7 @@ struct Times
 };
 
 Times
-measure (const Frame& frame, const Method& method, bool mirror, float size, int rounds, double& p999)
+measure (const Frame& frame, const Method& method, bool mirror, float size, int rounds, Comparison& comparison)
 {
   Pcl pcl;
   Ours ours;
@@ -294,10 +302,13 @@ measure (const Frame& frame, const Method& method, bool mirror, float size, int 
   run (ours, our_normals);
   c_api.compute (*frame.cloud, c_normals);
   const std::string what = frame.name + " " + method.name + (mirror ? " MIRROR" : " IGNORE");
-  p999 = compare (what, our_normals, pcl_normals);
-  compare (what + ", C API", c_normals, our_normals);
-  if (method.number != COVARIANCE_MATRIX && p999 > 0.01)
-    fail (what + ": p99.9 of the angle to PCL's is " + std::to_string (p999));
+  // COVARIANCE_MATRIX: PCL's own sums are f32. Its angles are off, and of a rare window it makes NaN
+  // (docs/pcl-compatibility.md); cpp_tests judges both by a reference in f64.
+  const bool covariance = method.number == COVARIANCE_MATRIX;
+  comparison = compare (what, our_normals, pcl_normals, covariance ? 5 : 0);
+  compare (what + ", C API", c_normals, our_normals, 0);
+  if (!covariance && comparison.p999 > 0.01)
+    fail (what + ": p99.9 of the angle to PCL's is " + std::to_string (comparison.p999));
 
   Copy copy (frame.cloud->size ());
   const auto fresh = [&] (auto& estimation) {
@@ -339,12 +350,13 @@ printFrames (const std::vector<Frame>& frames, int rounds)
       for (const float size : {10.0f, 20.0f})
         for (const Frame& frame : frames)
         {
-          double p999 = 0.0;
-          const Times t = measure (frame, method, mirror, size, rounds, p999);
+          Comparison comparison = {};
+          const Times t = measure (frame, method, mirror, size, rounds, comparison);
           char row[300];
-          std::snprintf (row, sizeof row, "| %s | %s | %s | %g | %.2f | %.2f | %.2f | %.2f | %.1f | %.1f | %.2f | %.2g |\n",
+          std::snprintf (row, sizeof row, "| %s | %s | %s | %g | %.2f | %.2f | %.2f | %.2f | %.1f | %.1f | %.2f | %.2g | %zu |\n",
                          frame.name.c_str (), method.name, mirror ? "MIRROR" : "IGNORE", size, t.copy, t.pcl, t.ours,
-                         t.c_api, t.pcl / t.ours, t.pcl / t.c_api, t.c_api / t.copy, p999);
+                         t.c_api, t.pcl / t.ours, t.pcl / t.c_api, t.c_api / t.copy, comparison.p999,
+                         comparison.only_first);
           rows += row;
           // Each size for itself, and both together: the targets are for both.
           for (const std::string& which : {number (size, "%g"), std::string ("10, 20")})
@@ -394,8 +406,8 @@ printFrames (const std::vector<Frame>& frames, int rounds)
                  median (s.pcl_fresh), median (s.ours_fresh), median (s.fresh_faster));
   }
   std::printf ("\n### Frame by frame\n\n| frame | method | border | smoothing | memcpy | PCL | our class | C API "
-               "| class: times faster | C API: times faster | C API: x memcpy | angle to PCL, p99.9 (deg) |\n"
-               "|---|---|---|---|---|---|---|---|---|---|---|---|\n%s\n", rows.c_str ());
+               "| class: times faster | C API: times faster | C API: x memcpy | angle to PCL, p99.9 (deg) | normals PCL lacks |\n"
+               "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n%s\n", rows.c_str ());
 }
 
 void
@@ -447,8 +459,6 @@ void
 printSizes ()
 {
   const std::vector<std::array<std::uint32_t, 2>> sizes = {{320, 240}, {640, 480}, {1280, 960}, {2560, 1920}, {4096, 3072}};
-  std::string costs, scratch;
-  std::array<std::vector<double>, 5> columns;
   std::printf ("### Cost by image size: ns a pixel (generated cloud, smoothing 10, IGNORE, C API)\n\n| method ");
   for (const auto& size : sizes)
     std::printf ("| %ux%u ", size[0], size[1]);
