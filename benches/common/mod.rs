@@ -104,5 +104,5 @@ fn is_hole(column: usize, row: usize) -> bool {
     let hash = hash ^ hash >> 12;
     let [x, y] = [column, row].map(|at| (at % CELL) as i32 - CELL as i32 / 2);
     let radius = 2 + (hash >> 8) as i32 % 6;
-    hash % 16 == 0 && x * x + y * y <= radius * radius
+    hash.is_multiple_of(16) && x * x + y * y <= radius * radius
 }
