@@ -279,6 +279,52 @@ impl<'a> Points<'a> {
             && normals.fields().iter().flatten().all(apart)
     }
 
+    /// Copies points from byte `first` of a row, four at a time and not the last one; returns how many.
+    #[cfg(target_arch = "x86_64")]
+    #[inline(always)]
+    fn read_whole_points(
+        &self,
+        first: usize,
+        count: usize,
+        stride: usize,
+        to: &mut [f32],
+    ) -> usize {
+        use std::arch::x86_64::*;
+        let step = self.grid.point_stride;
+        let mut done = 0;
+        while done + 4 < count {
+            // SAFETY: four points that are not the last one lie inside the row, and four floats of each plane inside
+            // `to`, as the caller checked; SSE is part of every x86-64.
+            unsafe {
+                let from = self.x.byte_add(first + done * step);
+                let (a, b) = (_mm_loadu_ps(from), _mm_loadu_ps(from.byte_add(step)));
+                let c = _mm_loadu_ps(from.byte_add(2 * step));
+                let d = _mm_loadu_ps(from.byte_add(3 * step));
+                let (ab_xy, cd_xy) = (_mm_unpacklo_ps(a, b), _mm_unpacklo_ps(c, d));
+                let (ab_zw, cd_zw) = (_mm_unpackhi_ps(a, b), _mm_unpackhi_ps(c, d));
+                let to = to.as_mut_ptr().add(done);
+                _mm_storeu_ps(to, _mm_movelh_ps(ab_xy, cd_xy));
+                _mm_storeu_ps(to.add(stride), _mm_movehl_ps(cd_xy, ab_xy));
+                _mm_storeu_ps(to.add(2 * stride), _mm_movelh_ps(ab_zw, cd_zw));
+            }
+            done += 4;
+        }
+        done
+    }
+
+    /// Other processors read every point coordinate by coordinate.
+    #[cfg(not(target_arch = "x86_64"))]
+    #[inline(always)]
+    fn read_whole_points(
+        &self,
+        _first: usize,
+        _count: usize,
+        _stride: usize,
+        _to: &mut [f32],
+    ) -> usize {
+        0
+    }
+
     /// Copies the points of row `y` in `columns` to three planes, `stride` floats apart in `to`; and zeros after
     /// them up to a multiple of 8 and 8 more. `whole_points` as [`Points::has_whole_points`] says.
     #[inline(always)]
@@ -295,29 +341,7 @@ impl<'a> Points<'a> {
         assert!(to.len() >= 2 * stride + count.next_multiple_of(8) + 8);
         let first = self.grid.offset(columns.start, y);
         let step = self.grid.point_stride;
-        let mut done = 0;
-        #[cfg(not(target_arch = "x86_64"))]
-        let _ = whole_points;
-        #[cfg(target_arch = "x86_64")]
-        if whole_points {
-            use std::arch::x86_64::*;
-            // The cloud's last point is not read whole.
-            while done + 4 < count {
-                // SAFETY: four points that are not the last one lie inside the row, and four floats of each plane
-                // inside `to`; SSE is part of every x86-64.
-                unsafe {
-                    let from = self.x.byte_add(first + done * step);
-                    let [a, b, c, d] = [0, 1, 2, 3].map(|i| _mm_loadu_ps(from.byte_add(i * step)));
-                    let (ab_xy, cd_xy) = (_mm_unpacklo_ps(a, b), _mm_unpacklo_ps(c, d));
-                    let (ab_zw, cd_zw) = (_mm_unpackhi_ps(a, b), _mm_unpackhi_ps(c, d));
-                    let to = to.as_mut_ptr().add(done);
-                    _mm_storeu_ps(to, _mm_movelh_ps(ab_xy, cd_xy));
-                    _mm_storeu_ps(to.add(stride), _mm_movehl_ps(cd_xy, ab_xy));
-                    _mm_storeu_ps(to.add(2 * stride), _mm_movelh_ps(ab_zw, cd_zw));
-                }
-                done += 4;
-            }
-        }
+        let done = if whole_points { self.read_whole_points(first, count, stride, to) } else { 0 };
         for at in done..count {
             let offset = first + at * step;
             for (c, field) in [self.x, self.y, self.z].into_iter().enumerate() {
@@ -480,6 +504,7 @@ fn prefetch_for_writing(at: *mut f32, point_stride: usize) {
 }
 
 /// How far ahead lines are asked for; found by trying 16 to 128 on 640x480.
+#[cfg(target_arch = "x86_64")]
 const PIXELS_AHEAD: usize = 48;
 
 /// Stores the first two floats.

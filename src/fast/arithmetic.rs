@@ -52,6 +52,12 @@ impl<S: Simd> Floats<S> {
     }
 
     #[inline(always)]
+    pub fn abs(self) -> Self {
+        // SAFETY: there is a group, so there is the instruction set.
+        Floats(unsafe { S::abs(self.0) })
+    }
+
+    #[inline(always)]
     pub fn sqrt(self) -> Self {
         // SAFETY: there is a group, so there is the instruction set.
         Floats(unsafe { S::sqrt(self.0) })

@@ -236,16 +236,21 @@ impl Sums for HalfWindows {
         unsafe {
             let n = cross(h, v);
             let n2 = dot(n, n);
-            let sine = dot(h, h) * dot(v, v) * Floats::splat(DOUBT_SINE);
+            let (h2, v2) = (dot(h, h), dot(v, v));
+            let sine = h2 * v2 * Floats::splat(DOUBT_SINE);
             // Below this, squares of floats lose digits.
             let least = Floats::splat(f32::MIN_POSITIVE / f32::EPSILON);
             // In windows of 3 both tangents join the same two points: floats decide the direction, as in PCL.
             let smallest = Floats::<S>(sides).lt(Floats::splat(4.0));
+            // And where they say that the tangents are parallel, there is no normal: n / |n| is NaN then.
+            let zero = Floats::splat(0.0);
+            let parallel = !(zero.lt(n[0].abs().max(n[1].abs()).max(n[2].abs())));
+            let floats_decide = smallest & (least.lt(n2) | parallel & least.lt(h2) & least.lt(v2));
             let scale = Floats::splat(1.0) / n2.sqrt();
             Found {
                 normal: [n[0] * scale, n[1] * scale, n[2] * scale],
                 curvature: Floats::splat(f32::NAN),
-                doubtful: !(sine.max(least).lt(n2) | smallest & least.lt(n2)),
+                doubtful: !(sine.max(least).lt(n2) | floats_decide),
             }
         }
     }

@@ -69,7 +69,7 @@ impl LaneOrder {
         (x % self.segment, x / self.segment)
     }
 
-    /// Reads a row of floats, `stride` bytes apart, into lane order. Elements past the row's end stay as they are.
+    /// Reads a row of floats, `stride` bytes apart, into lane order, and zeros past the row's end.
     ///
     /// # Safety
     /// `row` is valid for `width` reads.
@@ -96,11 +96,16 @@ impl LaneOrder {
             }
             for lane in lane..lane + 4 {
                 let start = lane * self.segment;
-                for element in together..self.segment.min(self.width.saturating_sub(start)) {
-                    // SAFETY: start + element < width, and element < segment = length of `to`.
+                let inside = self.segment.min(self.width.saturating_sub(start));
+                for element in together..self.segment {
+                    // SAFETY: start + element < width where it is read, and element < segment = length of `to`.
                     unsafe {
-                        let from = row.byte_add((start + element) * stride);
-                        to.add(element * LANES + lane).write(from.read());
+                        let value = if element < inside {
+                            row.byte_add((start + element) * stride).read()
+                        } else {
+                            0.0
+                        };
+                        to.add(element * LANES + lane).write(value);
                     }
                 }
             }

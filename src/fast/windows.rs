@@ -134,7 +134,7 @@ impl<'a> WindowRows<'a> {
             // SAFETY: as the caller's.
             unsafe {
                 if last {
-                    sweep.start_last_row::<S>(order, far, row);
+                    sweep.start_last_row::<S>(order, y, far, row, &mut largest);
                 } else {
                     sweep.start_row::<S>(order, y, factor, far, row, &mut largest);
                 }
@@ -261,14 +261,27 @@ impl Sweep {
     /// # Safety
     /// As [`Sweep::start_row`].
     #[inline(always)]
-    unsafe fn start_last_row<S: Simd>(&self, order: LaneOrder, far: f32, row: &mut [Lanes]) {
-        for (row, above) in row[..order.segment].iter_mut().zip(&self.above) {
-            // SAFETY: as the caller's.
-            unsafe {
-                let above = above.load::<S>();
-                row.store_group::<S>(0, S::and_not(above[0], S::splat(far)));
-                row.store_group::<S>(1, S::and_not(above[1], S::splat(far)));
+    unsafe fn start_last_row<S: Simd>(
+        &self,
+        order: LaneOrder,
+        y: usize,
+        far: f32,
+        row: &mut [Lanes],
+        largest: &mut Lanes,
+    ) {
+        let z = &self.z[self.z_place(order, y)];
+        // SAFETY: as the caller's.
+        unsafe {
+            let mut most = largest.load::<S>();
+            for k in 0..order.segment {
+                let (above, own) = (self.above[k].load::<S>(), z[k].load::<S>());
+                for g in 0..2 {
+                    row[k].store_group::<S>(g, S::and_not(above[g], S::splat(far)));
+                    most[g] = S::max(S::and(S::finite(own[g]), S::abs(own[g])), most[g]);
+                }
             }
+            largest.store_group::<S>(0, most[0]);
+            largest.store_group::<S>(1, most[1]);
         }
     }
 

@@ -258,10 +258,6 @@ impl Simd for Neon {
         unsafe { each!(vdivq_f64, a, b) }
     }
     #[inline(always)]
-    unsafe fn sqrt_d(a: Self::D) -> Self::D {
-        unsafe { each!(vsqrtq_f64, a) }
-    }
-    #[inline(always)]
     unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D {
         unsafe { pick!(vcgtq_f64, vbslq_f64, a, b) }
     }
@@ -421,7 +417,6 @@ mod tests {
                 S::sub_d(dx, dy),
                 S::mul_d(dx, dy),
                 S::div_d(dx, dy),
-                S::sqrt_d(dx),
                 S::max_d(dx, dy),
                 S::select_lt_d(dx, dy, tenth, dy),
                 S::select_bits_d(bits, dx, dy),

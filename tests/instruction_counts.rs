@@ -1,0 +1,150 @@
+//! Instructions per pixel of every method, counted by callgrind: a guard against getting slower that does not depend
+//! on the machine's load.
+//!
+//! `cargo test --release --test instruction_counts -- print` prints the counts beside the bounds, and what of them
+//! is the windows (`sweep`) and the sums and normals (`tile`). After a change that is meant to cost, or that saves, set
+//! the bounds to the counts and 15 %: `... -- print` ends with the table as it should then be. With `IINE_ISA=sse2`
+//! it does so for the other column.
+//!
+//! The program runs itself under valgrind: `frames N METHOD POLICY` computes N frames. The counts are the difference
+//! between two frames and one, so neither start nor the first frame's allocations are in them.
+
+#[path = "../benches/common/mod.rs"]
+mod common;
+
+use std::path::Path;
+use std::process::{Command, ExitCode};
+
+use common::Cloud;
+use iine::{BorderPolicy, Estimator, Isa, Method, Options};
+
+const WIDTH: usize = 640;
+const HEIGHT: usize = 480;
+
+/// Instructions a pixel at most: with AVX2, with SSE2.
+const BOUNDS: [(Method, BorderPolicy, u64, u64); 7] = [
+    (Method::CovarianceMatrix, BorderPolicy::Ignore, 229, 483),
+    (Method::CovarianceMatrix, BorderPolicy::Mirror, 372, 570),
+    (Method::Average3DGradient, BorderPolicy::Ignore, 117, 193),
+    (Method::Average3DGradient, BorderPolicy::Mirror, 190, 252),
+    (Method::AverageDepthChange, BorderPolicy::Ignore, 135, 209),
+    (Method::AverageDepthChange, BorderPolicy::Mirror, 289, 343),
+    (Method::Simple3DGradient, BorderPolicy::Ignore, 113, 186),
+];
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if arguments.first().is_some_and(|word| word == "frames") {
+        let number = |k: usize| arguments[k].parse::<usize>().expect("a number");
+        frames(number(1), Method::ALL[number(2)], BorderPolicy::ALL[number(3)]);
+        return ExitCode::SUCCESS;
+    }
+    if !cfg!(target_arch = "x86_64") {
+        return ExitCode::SUCCESS;
+    }
+    if cfg!(debug_assertions) {
+        println!("skipped: instruction_counts: the bounds are for --release");
+        return ExitCode::SUCCESS;
+    }
+    if Command::new("valgrind").arg("--version").output().is_err() {
+        println!("skipped: instruction_counts: no valgrind");
+        return ExitCode::SUCCESS;
+    }
+    let printing = arguments.iter().any(|word| word == "print");
+    let asked = std::env::var("IINE_ISA").ok();
+    let isa = if asked.as_deref() == Some("sse2") || !Isa::Avx2.is_available() {
+        Isa::Sse2
+    } else {
+        Isa::Avx2
+    };
+
+    let mut good = true;
+    let mut table = Vec::new();
+    for (method, policy, avx2, sse2) in BOUNDS {
+        let bound = if isa == Isa::Avx2 { avx2 } else { sse2 };
+        let (count, stages) = count(method, policy, isa);
+        let name = format!("{method:?} {policy:?} {}", isa.name());
+        let verdict = if count <= bound { "ok" } else { "FAILED" };
+        println!("{verdict} {name}: {count} instructions a pixel, at most {bound}");
+        if printing {
+            for (stage, share) in stages {
+                println!("   {stage}: {share}");
+            }
+        }
+        let raised = count + (count * 15).div_ceil(100);
+        let bounds = if isa == Isa::Avx2 { [raised, sse2] } else { [avx2, raised] };
+        table.push(format!(
+            "    (Method::{method:?}, BorderPolicy::{policy:?}, {}, {}),",
+            bounds[0], bounds[1]
+        ));
+        good &= count <= bound;
+    }
+    if printing {
+        println!("{}", table.join("\n"));
+    }
+    if good { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// What is counted.
+fn frames(number: usize, method: Method, border_policy: BorderPolicy) {
+    let cloud = Cloud::generated(WIDTH, HEIGHT);
+    let mut options = Options::default();
+    options.method = method;
+    options.border_policy = border_policy;
+    options.depth_dependent_smoothing = true;
+    let mut estimator = Estimator::new(options);
+    let mut output = cloud.output();
+    for _ in 0..number {
+        cloud.compute(&mut estimator, &mut output);
+    }
+    let covered = output.chunks(common::NORMAL).filter(|normal| !normal[0].is_nan()).count();
+    assert!(covered > cloud.pixels() / 2, "{covered} normals");
+}
+
+/// Instructions a pixel, and by stage.
+fn count(method: Method, policy: BorderPolicy, isa: Isa) -> (u64, Vec<(&'static str, u64)>) {
+    let started = [1, 2].map(|number| {
+        let output = Path::new(env!("CARGO_TARGET_TMPDIR"))
+            .join(format!("callgrind.{method:?}.{policy:?}.{number}"));
+        let child = Command::new("valgrind")
+            .arg("--tool=callgrind")
+            .arg(format!("--callgrind-out-file={}", output.display()))
+            .arg(std::env::current_exe().expect("this test's path"))
+            .args(["frames", &number.to_string()])
+            .args([(method as i32).to_string(), (policy as i32).to_string()])
+            .env("IINE_ISA", isa.name())
+            .stderr(std::process::Stdio::null())
+            .spawn();
+        (child.expect("valgrind"), output)
+    });
+    let [one, two] = started.map(|(mut child, output)| {
+        assert!(child.wait().expect("valgrind").success(), "valgrind failed");
+        inclusive(&output)
+    });
+    let pixels = (WIDTH * HEIGHT) as u64;
+    let between = |k: usize| two[k].saturating_sub(one[k]).div_ceil(pixels);
+    (between(0), vec![("sweep", between(1)), ("tile", between(2))])
+}
+
+/// Instructions of the program, of the sweeps and of the tiles, each with what they call.
+fn inclusive(file: &Path) -> [u64; 3] {
+    let output = Command::new("callgrind_annotate")
+        .args(["--inclusive=yes", "--threshold=100", "--show-percs=no"])
+        .arg(file)
+        .output()
+        .expect("callgrind_annotate");
+    let text = String::from_utf8_lossy(&output.stdout);
+    // "1,234,567  file:function [object]"
+    let sum = |matches: &dyn Fn(&str) -> bool| {
+        let lines = text.lines().filter(|line| matches(line));
+        let number =
+            |line: &str| line.split_whitespace().next()?.replace(',', "").parse::<u64>().ok();
+        lines.filter_map(number).sum::<u64>()
+    };
+    let total = sum(&|line| line.contains("PROGRAM TOTALS"));
+    assert!(total > 0, "callgrind_annotate: {text}");
+    let stage = |name: &str| {
+        sum(&|line| line.contains("iine::fast::paths::") && line.contains(&format!("::{name}")))
+    };
+    [total, stage("sweep"), stage("tile")]
+}
