@@ -7,19 +7,24 @@ use crate::distance::distance_map;
 use crate::fast::{self, SMALLEST_IMAGE, Scratch};
 use crate::isa::Isa;
 use crate::methods::{Estimate, estimate, estimate_window};
-use crate::options::Options;
+use crate::options::{Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
+use crate::paper::PaperMaps;
 use crate::smoothing_area::window_side;
 use crate::window::Image;
 
 /// The maps behind the normals; each is written if it is there and must hold width x height elements, row by row.
 #[derive(Debug, Default)]
 pub struct Maps<'a> {
+    /// Radius that the depth asks for (the paper's B, Eq. 5), within its limits, in pixels; NaN at missing points.
+    /// Only with [`Semantics::Paper`](crate::Semantics::Paper).
+    pub depth_radii: Option<&'a mut [f32]>,
     /// Depth change indication map (the paper's C): 1 at a depth change, else 0.
     pub depth_changes: Option<&'a mut [u8]>,
     /// Distance to the nearest depth change in pixels (the paper's T; PCL's `getDistanceMap`).
     pub distances: Option<&'a mut [f32]>,
-    /// Smoothing area map (the paper's R): the side of the pixel's window in pixels, 0 where there is none.
+    /// Smoothing area map: the side of the pixel's window in pixels, or with
+    /// [`Semantics::Paper`](crate::Semantics::Paper) its radius R (Eq. 8); 0 where there is no window.
     pub smoothing_areas: Option<&'a mut [f32]>,
 }
 
@@ -178,11 +183,13 @@ impl Estimator {
 
     /// Computes the maps behind the normals.
     ///
-    /// Errors: [`Error::Size`] if a map's length is not width x height, and what [`Options::check`] refuses.
+    /// Errors: [`Error::Size`] if a map's length is not width x height, [`Error::Unsupported`] for a map that the
+    /// semantics does not have, and what [`Options::check`] refuses.
     pub fn compute_maps(&mut self, points: &Points, maps: &mut Maps) -> Result<(), Error> {
         self.options.check()?;
         let (width, height) = (points.width(), points.height());
         let lengths = [
+            maps.depth_radii.as_ref().map(|map| map.len()),
             maps.depth_changes.as_ref().map(|map| map.len()),
             maps.distances.as_ref().map(|map| map.len()),
             maps.smoothing_areas.as_ref().map(|map| map.len()),
@@ -190,18 +197,36 @@ impl Estimator {
         if lengths.into_iter().flatten().any(|length| length != width * height) {
             return Err(Error::Size);
         }
-        let plain = Plain::new(points, &self.options);
-        if let Some(map) = &mut maps.depth_changes {
-            for (to, from) in map.iter_mut().zip(&plain.depth_changes) {
-                *to = u8::from(*from);
+        let write = |map: &mut Option<&mut [f32]>, from: &[f32]| {
+            if let Some(map) = map {
+                map.copy_from_slice(from);
             }
-        }
-        if let Some(map) = &mut maps.distances {
-            map.copy_from_slice(&plain.distances);
-        }
-        if let Some(map) = &mut maps.smoothing_areas {
-            for (at, to) in map.iter_mut().enumerate() {
-                *to = plain.window_side(at % width, at / width) as f32;
+        };
+        let depth_changes = match self.options.semantics {
+            Semantics::Pcl => {
+                if maps.depth_radii.is_some() {
+                    return Err(Error::Unsupported);
+                }
+                let plain = Plain::new(points, &self.options);
+                write(&mut maps.distances, &plain.distances);
+                if let Some(map) = &mut maps.smoothing_areas {
+                    for (at, to) in map.iter_mut().enumerate() {
+                        *to = plain.window_side(at % width, at / width) as f32;
+                    }
+                }
+                plain.depth_changes
+            }
+            Semantics::Paper => {
+                let paper = PaperMaps::new(points, &self.options);
+                write(&mut maps.depth_radii, &paper.depth_radii);
+                write(&mut maps.distances, &paper.distances);
+                write(&mut maps.smoothing_areas, &paper.smoothing_radii);
+                paper.depth_changes
+            }
+        };
+        if let Some(map) = &mut maps.depth_changes {
+            for (to, from) in map.iter_mut().zip(depth_changes) {
+                *to = u8::from(from);
             }
         }
         Ok(())

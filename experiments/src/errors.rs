@@ -1,6 +1,6 @@
 //! Angles to the true normals, by band, with coverage.
 
-use iine_scenes::{Band, Distances, Frame};
+use iine_scenes::{Distances, Frame};
 
 /// What an estimate is worth in a part of the image.
 #[derive(Clone, Debug, Default)]
@@ -44,7 +44,7 @@ pub fn angle(a: [f32; 3], b: [f32; 3]) -> f32 {
     sine.atan2(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]).to_degrees() as f32
 }
 
-/// The scores of normals in the bands of [`Band::ALL`].
+/// The scores of normals in the bands of [`iine_scenes::Band::ALL`].
 pub fn by_band(frame: &Frame, distances: &Distances, normals: &[[f32; 3]]) -> [Score; 3] {
     let mut scores = [(); 3].map(|()| Score::default());
     for (at, normal) in normals.iter().enumerate() {

@@ -364,6 +364,7 @@ pub unsafe extern "C" fn iine_estimator_compute_maps(
         // SAFETY: promised by the caller; they overlap nothing.
         let mut maps = unsafe {
             Maps {
+                depth_radii: None,
                 depth_changes: optional_slice(maps.depth_changes, pixels)?,
                 distances: optional_slice(maps.distances, pixels)?,
                 smoothing_areas: optional_slice(maps.smoothing_areas, pixels)?,

@@ -34,40 +34,80 @@ impl SummedNormals {
     }
 }
 
-pub(crate) fn env(name: &str, default: f64) -> f64 {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
+/// Normals that vary more than this in a window, in square radians, ask for a second look.
+const STRONG_VARIATION: f64 = 0.01;
+/// How far around a pixel its own surface must lie on the plane of its window, in pixels.
+const NEAR: usize = 1;
+/// What the squared deviation of the points next to the pixel counts in a window's score.
+const NEAR_WEIGHT: f64 = 9.0;
+/// A window whose score is below (this alpha)^2 is a plane already.
+const EVEN: f64 = 0.05;
+/// What another window's score must be below, as a share of the own window's.
+const WORTH: f64 = 0.8;
+/// What a smaller window's score must be below, as a share of the larger one's.
+const SHRINK: f64 = 0.6;
+/// How many sizes are tried.
+const SIZES: usize = 2;
+
+/// The linear function of the position that fits the inverse depths in a rectangle best.
+struct Fit {
+    center: [f64; 2],
+    slope: [f64; 2],
+    offset: f64,
+    /// The mean square deviation.
+    unevenness: f64,
 }
 
-/// The mean square deviation of the inverse depths in a rectangle from a linear function of the position;
-/// infinite if there are too few to tell.
-fn unevenness(cloud: &Cloud, rect: &Rect) -> f64 {
-    let (cx, cy) =
-        ((rect.x.start + rect.x.end) as f64 / 2.0, (rect.y.start + rect.y.end) as f64 / 2.0);
-    let mut s = [0.0f64; 10];
-    for (x, y) in rect.pixels() {
-        let depth = cloud.depths[cloud.index(x, y)];
-        let r = 1.0 / f64::from(depth);
-        if !r.is_finite() {
-            continue;
+impl Fit {
+    fn of(cloud: &Cloud, rect: &Rect) -> Option<Fit> {
+        let center =
+            [(rect.x.start + rect.x.end) as f64 / 2.0, (rect.y.start + rect.y.end) as f64 / 2.0];
+        let mut s = [0.0f64; 10];
+        for (x, y) in rect.pixels() {
+            let r = 1.0 / f64::from(cloud.depths[cloud.index(x, y)]);
+            if !r.is_finite() {
+                continue;
+            }
+            let (x, y) = (x as f64 - center[0], y as f64 - center[1]);
+            for (s, v) in s.iter_mut().zip([1.0, x, y, x * x, x * y, y * y, r, x * r, y * r, r * r])
+            {
+                *s += v;
+            }
         }
-        let (x, y) = (x as f64 - cx, y as f64 - cy);
-        for (s, v) in s.iter_mut().zip([1.0, x, y, x * x, x * y, y * y, r, x * r, y * r, r * r]) {
-            *s += v;
+        let n = s[0];
+        if n < 6.0 {
+            return None;
         }
+        let (mx, my, mr) = (s[1] / n, s[2] / n, s[6] / n);
+        let (xx, xy, yy) = (s[3] - n * mx * mx, s[4] - n * mx * my, s[5] - n * my * my);
+        let (xr, yr, rr) = (s[7] - n * mx * mr, s[8] - n * my * mr, s[9] - n * mr * mr);
+        let det = xx * yy - xy * xy;
+        if det <= 1e-9 * xx * yy {
+            return None;
+        }
+        let (a, b) = ((xr * yy - yr * xy) / det, (yr * xx - xr * xy) / det);
+        Some(Fit {
+            center,
+            slope: [a, b],
+            offset: mr - a * mx - b * my,
+            unevenness: (rr - a * xr - b * yr).max(0.0) / (n - 3.0),
+        })
     }
-    let n = s[0];
-    if n < 6.0 {
-        return f64::INFINITY;
+
+    fn mean_deviation(&self, cloud: &Cloud, rect: &Rect) -> f64 {
+        let (mut sum, mut n) = (0.0, 0.0);
+        for (x, y) in rect.pixels() {
+            let r = 1.0 / f64::from(cloud.depths[cloud.index(x, y)]);
+            if r.is_finite() {
+                sum += r
+                    - self.offset
+                    - self.slope[0] * (x as f64 - self.center[0])
+                    - self.slope[1] * (y as f64 - self.center[1]);
+                n += 1.0;
+            }
+        }
+        if n == 0.0 { 0.0 } else { sum / n }
     }
-    let (mx, my, mr) = (s[1] / n, s[2] / n, s[6] / n);
-    let (xx, xy, yy) = (s[3] - n * mx * mx, s[4] - n * mx * my, s[5] - n * my * my);
-    let (xr, yr, rr) = (s[7] - n * mx * mr, s[8] - n * my * mr, s[9] - n * mr * mr);
-    let det = xx * yy - xy * xy;
-    if det <= 1e-9 * xx * yy {
-        return f64::INFINITY;
-    }
-    let (a, b) = ((xr * yy - yr * xy) / det, (yr * xx - xr * xy) / det);
-    (rr - a * xr - b * yr).max(0.0) / (n - 3.0)
 }
 
 /// The window to use instead of `rect`; none if that is to be kept.
@@ -79,28 +119,33 @@ pub(crate) fn window(
     rect: &Rect,
     alpha: f64,
 ) -> Option<Rect> {
-    if normals.variation(rect) <= env("STRONG", 0.01) {
+    if normals.variation(rect) <= STRONG_VARIATION {
         return None;
     }
-    let own = unevenness(cloud, rect);
-    let floor = (env("KAPPA", 0.05) * alpha).powi(2);
-    if own <= floor {
+    let size = (cloud.width, cloud.height);
+    let near = Rect::around(pixel, NEAR, size);
+    let near = if changes.none_in(&near) { near } else { Rect::around(pixel, 0, size) };
+    let score = |rect: &Rect| {
+        let fit = Fit::of(cloud, rect);
+        fit.map_or(f64::INFINITY, |fit| {
+            fit.unevenness + NEAR_WEIGHT * fit.mean_deviation(cloud, &near).powi(2)
+        })
+    };
+    let own = score(rect);
+    if own <= (EVEN * alpha).powi(2) {
         return None;
     }
-    let mut best = (own * env("WORTH", 0.8), None);
-    let mut side = Some(rect.x.len().max(rect.y.len()));
-    for _ in 0..env("SIZES", 2.0) as usize {
+    let mut best = (own * WORTH, None);
+    let mut side = Some(rect.side());
+    for _ in 0..SIZES {
         let Some(tried) = side else { break };
         for rect in windows(pixel, tried, cloud.width, cloud.height) {
-            if !changes.none_in(&rect) {
-                continue;
-            }
-            let found = unevenness(cloud, &rect);
+            let found = if changes.none_in(&rect) { score(&rect) } else { f64::INFINITY };
             if found < best.0 {
                 best = (found, Some(rect));
             }
         }
-        best.0 *= env("SHRINK", 0.6);
+        best.0 *= SHRINK;
         side = smaller(tried);
     }
     best.1
