@@ -144,9 +144,6 @@ impl Default for PaperOptions {
 }
 
 impl PaperOptions {
-    /// The largest value that [`PaperOptions::largest_radius`] takes.
-    pub const LIMIT_RADIUS: u32 = 1000;
-
     /// The alpha of a stereo or structured light sensor: its depth is focal * baseline / disparity, so that one
     /// disparity step is a depth change of step / (focal * baseline) d^2.
     ///
@@ -164,7 +161,7 @@ impl PaperOptions {
             && self.smallest_radius >= 1
             && self.smallest_radius <= self.least_depth_radius
             && self.least_depth_radius <= self.largest_radius
-            && self.largest_radius <= Self::LIMIT_RADIUS;
+            && self.largest_radius <= 1000;
         if in_range { Ok(()) } else { Err(Error::OptionValue) }
     }
 }

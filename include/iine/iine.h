@@ -126,11 +126,6 @@
 #define IINE_VERSION_PATCH 0
 
 /**
- * The largest value that [`PaperOptions::largest_radius`] takes.
- */
-#define PaperOptions_LIMIT_RADIUS 1000
-
-/**
  * Estimates normals. Owns its options and its scratch memory, which is reused from frame to frame.
  *
  * One estimator is used by one thread at a time; different estimators freely.
