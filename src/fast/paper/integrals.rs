@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::cloud::Points;
 use crate::fast::planes::grow;
-use crate::simd::GROUP;
+use crate::simd::{GROUP, Simd};
 
 /// x, y, z, and 1; zeros for a missing point.
 pub(crate) type Counted = [f32; 4];
@@ -98,24 +98,43 @@ impl<const N: usize> Rings<N> {
 
     /// Reads row `y` of the points, of which `depths` says which are missing. `whole_points` as
     /// [`Points::has_whole_points`] says.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub fn read(&mut self, points: &Points, depths: &[f32], y: usize, whole_points: bool) {
+    pub unsafe fn read<S: Simd>(
+        &mut self,
+        points: &Points,
+        depths: &[f32],
+        y: usize,
+        whole_points: bool,
+    ) {
         let row = self.row(y);
         let to = &mut self.points[row.start + 1..row.end - 1];
-        let depths = &depths[self.columns.clone()];
         let Range { start, end } = self.columns;
         assert!(y < points.height() && start < end && end <= points.width());
-        let whole = if whole_points { end - 1 } else { start };
+        assert!(end.next_multiple_of(GROUP) <= depths.len());
         let mut largest = self.largest;
-        for i in 0..whole - start {
-            // SAFETY: the pixel is inside the cloud, and not its last.
-            let point = unsafe { points.whole_at_unchecked(start + i, y) };
-            put(&mut to[i], depths[i], point, &mut largest);
-        }
-        for i in whole - start..end - start {
-            // SAFETY: the pixel is inside the cloud.
-            let [x, y, z] = unsafe { points.at_unchecked(start + i, y) };
-            put(&mut to[i], depths[i], [x, y, z, 0.0], &mut largest);
+        for x in (start..end).step_by(GROUP) {
+            let count = (end - x).min(GROUP);
+            let to = &mut to[x - start..x - start + count];
+            let mut there = [0.0_f32; GROUP];
+            // SAFETY: as the caller's; the pixels are inside the cloud, and the depths readable in whole groups.
+            unsafe {
+                let depths = S::load(depths.as_ptr().add(x));
+                S::store(there.as_mut_ptr(), S::eq(depths, depths));
+                if whole_points && count == GROUP && x + count < end {
+                    for i in 0..GROUP {
+                        let point = points.whole_at_unchecked(x + i, y);
+                        put(&mut to[i], there[i], point, &mut largest);
+                    }
+                } else {
+                    for i in 0..count {
+                        let [x, y, z] = points.at_unchecked(x + i, y);
+                        put(&mut to[i], there[i], [x, y, z, 0.0], &mut largest);
+                    }
+                }
+            }
         }
         self.largest = largest;
     }
@@ -160,13 +179,12 @@ impl<const N: usize> Rings<N> {
     }
 }
 
-/// Puts a point, or zeros if its depth is missing, and keeps the largest magnitudes.
+/// Puts a point, or zeros where the mask says that it is missing, and keeps the largest magnitudes.
 #[inline(always)]
-fn put(to: &mut Counted, depth: f32, point: [f32; 4], largest: &mut Counted) {
-    let there = if depth.is_nan() { 0 } else { !0 };
+fn put(to: &mut Counted, there: f32, point: [f32; 4], largest: &mut Counted) {
     let point = [point[0], point[1], point[2], 1.0];
     for c in 0..4 {
-        to[c] = f32::from_bits(point[c].to_bits() & there);
+        to[c] = f32::from_bits(point[c].to_bits() & there.to_bits());
     }
     for c in 0..4 {
         let size = to[c].abs();

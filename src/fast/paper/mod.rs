@@ -18,13 +18,19 @@ use windows::{Rows, Sweep, reach};
 
 use super::paths::{self, Task};
 use super::sink::Sink;
-use super::{Chunk, Parts, TILE_BYTES, TILE_ROWS, lock, reserve, share_out};
+use super::{Chunk, Parts, lock, reserve, share_out};
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::options::{DistanceMetric, Method, Options};
 use crate::paper::PaperMaps;
 use crate::simd::{GROUP, Simd};
+
+/// Rows of a tile: those around it that its windows reach are read again for the next one.
+const TILE_ROWS: usize = 256;
+
+/// Bytes of a tile's rings, to stay in the second-level cache.
+const TILE_BYTES: usize = 512 << 10;
 
 /// Rows of the whole image: depths, and the radii of windows.
 #[derive(Debug, Default)]
@@ -136,8 +142,10 @@ pub(crate) fn compute(
     let across = width.div_ceil(columns);
     // Tiles of like widths.
     let columns = width.div_ceil(across).next_multiple_of(GROUP);
-    workers.for_each(across * height.div_ceil(TILE_ROWS), |worker, item| {
-        let (first, column) = (item / across * TILE_ROWS, item % across * columns);
+    let down = height.div_ceil(TILE_ROWS);
+    let rows = height.div_ceil(down);
+    workers.for_each(across * down, |worker, item| {
+        let (first, column) = (item / across * rows, item % across * columns);
         if column >= width {
             return;
         }
@@ -145,7 +153,7 @@ pub(crate) fn compute(
             points,
             options,
             columns: column..(column + columns).min(width),
-            rows: first..(first + TILE_ROWS).min(height),
+            rows: first..(first + rows).min(height),
             whole_points,
             largest,
             row,

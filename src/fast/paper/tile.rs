@@ -46,13 +46,15 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
             (self.rows.start.saturating_sub(reach), (self.rows.end + reach).min(height));
         let count = columns.len() * (bottom - top);
         rings.start(columns, top, reach);
-        rings.read(self.points, (self.row)(top).0, top, self.whole_points);
+        // SAFETY: as the caller's.
+        unsafe { rings.read::<S>(self.points, (self.row)(top).0, top, self.whole_points) };
         let mut next = top;
         for y in self.rows.clone() {
             while next < (y + reach + 1).min(bottom) {
                 if next + 1 < height {
                     let depths = (self.row)(next + 1).0;
-                    rings.read(self.points, depths, next + 1, self.whole_points);
+                    // SAFETY: as the caller's.
+                    unsafe { rings.read::<S>(self.points, depths, next + 1, self.whole_points) };
                 } else {
                     rings.read_none(next + 1);
                 }
