@@ -222,7 +222,7 @@ impl Sums<4> for SmoothedDepthChanges {
             numbers[0][lane][i] = sum[i] as f32;
         }
         for (line, to) in (0..2).zip(&mut numbers[1..]) {
-            let [from, end] = rects.ends[line];
+            let [from, end] = &rects.ends[line];
             let (a, b) = (&points[from[lane] as usize], &points[end[lane] as usize]);
             let both = a[3] * b[3];
             to[lane] = [b[0] - a[0], b[1] - a[1], rects.spans[line][lane], both];
