@@ -1,0 +1,183 @@
+//! Rings of the rows that a tile's windows need: points, and integral images (Eq. 1-3) of `N` channels.
+
+use std::ops::Range;
+
+use crate::cloud::Points;
+use crate::fast::lanes::transpose4;
+use crate::fast::planes::grow;
+use crate::simd::{GROUP, Simd};
+
+/// x, y, z, and 1; zeros for a missing point.
+pub(crate) type Counted = [f32; 4];
+
+/// What is summed: `N` channels of a pixel.
+pub(crate) trait Channels<const N: usize> {
+    /// The channels of a pixel, from its point and those to the left, to the right, above and below.
+    fn of(&self, own: &Counted, row: [&Counted; 2], column: [&Counted; 2]) -> [f64; N];
+}
+
+/// Both rings, over a tile's columns.
+#[derive(Debug)]
+pub(crate) struct Rings<const N: usize> {
+    /// Element i of a row is the sum over the columns before the i-th.
+    sums: Vec<[f64; N]>,
+    /// Element i + 1 of a row is the point of the i-th column; the first and those after the last are missing points.
+    points: Vec<Counted>,
+    columns: Range<usize>,
+    /// Rows in a ring.
+    pub rows: usize,
+    /// The row of points read last, coordinate by coordinate.
+    planes: Vec<f32>,
+    /// The largest magnitude of a coordinate read so far.
+    pub largest: f32,
+}
+
+impl<const N: usize> Default for Rings<N> {
+    fn default() -> Self {
+        let (sums, points, planes) = (Vec::new(), Vec::new(), Vec::new());
+        Rings { sums, points, columns: 0..0, rows: 0, planes, largest: 0.0 }
+    }
+}
+
+/// Rows of the rings for windows of a radius: theirs, and those above and below.
+pub(crate) fn rows_of_rings(radius: usize) -> usize {
+    2 * radius + 3
+}
+
+impl<const N: usize> Rings<N> {
+    /// Bytes that a column takes in a row.
+    pub const COLUMN: usize = size_of::<[f64; N]>() + size_of::<Counted>();
+
+    /// Bytes held.
+    pub fn size(&self) -> usize {
+        self.sums.capacity() * size_of::<[f64; N]>()
+            + self.points.capacity() * size_of::<Counted>()
+            + self.planes.capacity() * size_of::<f32>()
+    }
+
+    /// Starts over at row `top`, with windows of up to `radius`.
+    pub fn start(&mut self, columns: Range<usize>, top: usize, radius: usize) {
+        (self.columns, self.largest) = (columns, 0.0);
+        self.rows = rows_of_rings(radius);
+        let length = self.rows * self.stride();
+        grow(&mut self.points, length + GROUP);
+        self.points[..length].fill([0.0; 4]);
+        if self.sums.len() < length {
+            self.sums.resize(length, [0.0; N]);
+        }
+        let above = self.row(top + self.rows - 1);
+        self.sums[above].fill([0.0; N]);
+    }
+
+    /// Elements from a row to the next.
+    #[inline(always)]
+    pub fn stride(&self) -> usize {
+        self.columns.len().next_multiple_of(GROUP) + 2
+    }
+
+    /// The first column.
+    #[inline(always)]
+    pub fn left(&self) -> usize {
+        self.columns.start
+    }
+
+    #[inline(always)]
+    fn row(&self, y: usize) -> Range<usize> {
+        let start = y % self.rows * self.stride();
+        start..start + self.stride()
+    }
+
+    /// The points, and the sums.
+    #[inline(always)]
+    pub fn parts(&self) -> (&[Counted], &[[f64; N]]) {
+        let length = self.rows * self.stride();
+        (&self.points[..length], &self.sums[..length])
+    }
+
+    /// The eight points of row `y` from column `x` on; those behind the last column mean nothing.
+    #[inline(always)]
+    pub fn eight(&self, x: usize, y: usize) -> &[Counted; GROUP] {
+        let first = self.row(y).start + x - self.columns.start + 1;
+        self.points[first..].first_chunk().expect("a group of room behind the last row")
+    }
+
+    /// Reads row `y` of the points, of which `depths` says which are missing. `whole_points` as
+    /// [`Points::has_whole_points`] says.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn read<S: Simd>(
+        &mut self,
+        points: &Points,
+        depths: &[f32],
+        y: usize,
+        whole_points: bool,
+    ) {
+        let row = self.row(y);
+        let count = self.columns.len();
+        let length = count.next_multiple_of(GROUP);
+        assert!(self.columns.start + length <= depths.len());
+        grow(&mut self.planes, 3 * (length + GROUP));
+        let stride = length + GROUP;
+        points.read_row(y, self.columns.clone(), stride, &mut self.planes, whole_points);
+        let to = &mut self.points[row][1..];
+        // SAFETY: as the caller's; the planes, the depths and the row have room for whole groups.
+        unsafe {
+            let mut largest = S::splat(self.largest);
+            for x in (0..length).step_by(GROUP) {
+                let depths = S::load(depths.as_ptr().add(self.columns.start + x));
+                let there = S::eq(depths, depths);
+                let mut fields = [[0.0; GROUP]; 4];
+                for c in 0..3 {
+                    let field = S::load(self.planes.as_ptr().add(c * stride + x));
+                    let field = S::and(there, field);
+                    largest = S::max(S::abs(field), largest);
+                    S::store(fields[c].as_mut_ptr(), field);
+                }
+                S::store(fields[3].as_mut_ptr(), S::and(there, S::splat(1.0)));
+                let (from, to) = (fields.as_ptr().cast::<f32>(), to[x..x + GROUP].as_mut_ptr());
+                transpose4(from, GROUP, to.cast(), 4);
+                transpose4(from.add(4), GROUP, to.add(4).cast(), 4);
+            }
+            let mut lanes = [0.0; GROUP];
+            S::store(lanes.as_mut_ptr(), largest);
+            self.largest = lanes.into_iter().fold(0.0, f32::max);
+        }
+        to[count..].fill([0.0; 4]);
+    }
+
+    /// Has no points in row `y`: it is outside the image.
+    pub fn read_none(&mut self, y: usize) {
+        let row = self.row(y);
+        self.points[row].fill([0.0; 4]);
+    }
+
+    /// Sums row `y`; the rows around it have been read.
+    #[inline(always)]
+    pub fn push(&mut self, channels: &impl Channels<N>, y: usize) {
+        let count = self.columns.len();
+        let (above, own, below) = (self.row(y + self.rows - 1), self.row(y), self.row(y + 1));
+        let row = &self.points[own.clone()];
+        let (left, center, right) = (&row[..count], &row[1..=count], &row[2..count + 2]);
+        let up = &self.points[above.clone()][1..=count];
+        let down = &self.points[below][1..=count];
+        let Ok([above, sums]) = self.sums.get_disjoint_mut([above, own]) else { return };
+        let (above, sums) = (&above[1..=count], &mut sums[..=count]);
+        sums[0] = [0.0; N];
+        let sums = &mut sums[1..];
+        let mut along = [0.0; N];
+        for x in 0..count {
+            let value = channels.of(&center[x], [&left[x], &right[x]], [&up[x], &down[x]]);
+            for c in 0..N {
+                along[c] += value[c];
+                sums[x][c] = above[x][c] + along[c];
+            }
+        }
+    }
+
+    /// The sum over all that was pushed so far, `y` being the last row.
+    pub fn total(&self, y: usize) -> [f64; N] {
+        self.sums[self.row(y).start + self.columns.len()]
+    }
+}

@@ -1,0 +1,145 @@
+//! Step 5 of the paper, fast, for one tile of the image: rows of points go through a ring of integral rows, and
+//! every pixel takes its window's sum from it.
+
+use std::ops::Range;
+
+use super::integrals::Rings;
+use super::methods::{Sums, by_number};
+use super::rects::{Place, Rects};
+use crate::cloud::Points;
+use crate::fast::sink::Sink;
+use crate::fast::tile::{Bits, Octet};
+use crate::methods::Estimate;
+use crate::options::Options;
+use crate::orientation::turn_to_viewpoint;
+use crate::paper::{CleanPoints, Cleaned, plain_estimate, window};
+use crate::simd::{GROUP, Simd};
+
+/// A rectangle of the image whose normals are computed together.
+pub(crate) struct Tile<'a, F> {
+    pub points: &'a Points<'a>,
+    pub options: &'a Options,
+    pub columns: Range<usize>,
+    pub rows: Range<usize>,
+    pub whole_points: bool,
+    /// The largest radius in the frame.
+    pub largest: usize,
+    /// A row's depths and the radii of its windows.
+    pub row: F,
+}
+
+impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
+    /// # Safety
+    /// The processor has the instruction set of `S`; no one else writes the tile's pixels.
+    #[inline(always)]
+    pub unsafe fn compute<S: Simd, M: Sums<N>, const N: usize>(
+        &self,
+        method: &M,
+        rings: &mut Rings<N>,
+        sink: &Sink,
+    ) {
+        let (width, height) = (self.points.width(), self.points.height());
+        let reach = self.largest;
+        let columns =
+            self.columns.start.saturating_sub(reach)..(self.columns.end + reach).min(width);
+        let (top, bottom) =
+            (self.rows.start.saturating_sub(reach), (self.rows.end + reach).min(height));
+        let count = columns.len() * (bottom - top);
+        rings.start(columns, top, reach);
+        // SAFETY: as the caller's.
+        unsafe { rings.read::<S>(self.points, (self.row)(top).0, top, self.whole_points) };
+        let mut next = top;
+        for y in self.rows.clone() {
+            while next < (y + reach + 1).min(bottom) {
+                if next + 1 < height {
+                    let depths = (self.row)(next + 1).0;
+                    // SAFETY: as the caller's.
+                    unsafe { rings.read::<S>(self.points, depths, next + 1, self.whole_points) };
+                } else {
+                    rings.read_none(next + 1);
+                }
+                rings.push(method, next);
+                next += 1;
+            }
+            let error = M::error(rings.total(next - 1), count, rings.largest);
+            // SAFETY: as the caller's.
+            unsafe { self.row::<S, M, N>(rings, sink, y, error) };
+        }
+    }
+
+    /// A point of the tile: sums about it lose less.
+    pub fn origin(&self) -> [f32; 3] {
+        for y in self.rows.clone() {
+            let depths = &(self.row)(y).0[self.columns.clone()];
+            if let Some(at) = depths.iter().position(|depth| !depth.is_nan()) {
+                return self.points.at(self.columns.start + at, y);
+            }
+        }
+        [0.0; 3]
+    }
+
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn row<S: Simd, M: Sums<N>, const N: usize>(
+        &self,
+        rings: &Rings<N>,
+        sink: &Sink,
+        y: usize,
+        error: f64,
+    ) {
+        let image = [self.points.width(), self.points.height()];
+        let (left, stride, rows) = (rings.left(), rings.stride(), rings.rows);
+        let (points, sums) = rings.parts();
+        let radii = (self.row)(y).1;
+        for x in self.columns.clone().step_by(GROUP) {
+            let count = (self.columns.end - x).min(GROUP);
+            // SAFETY: as the caller's; a row of radii is readable up to a whole group, and the rings hold what the
+            // windows of the tile's pixels need.
+            unsafe {
+                let of_row = S::load(radii.as_ptr().add(x));
+                let windows = S::bits(S::lt(S::splat(0.0), of_row)) & ((1 << count) - 1);
+                if windows == 0 {
+                    sink.write_none(x, y, count);
+                    continue;
+                }
+                let place = Place { image, x, y, left, stride, rows };
+                let rects = Rects::new::<S>(&place, of_row, M::INNER, M::ENDS);
+                let mut numbers = M::Numbers::default();
+                let mut todo = windows;
+                while todo != 0 {
+                    let lane = todo.trailing_zeros() as usize % GROUP;
+                    todo &= todo - 1;
+                    let [a, b, c, d] =
+                        rects.corners.each_ref().map(|i| sums.get_unchecked(i[lane] as usize));
+                    let mut sum = [0.0; N];
+                    for i in 0..N {
+                        sum[i] = (d[i] - c[i]) - (b[i] - a[i]);
+                    }
+                    M::take(&mut numbers, lane, sum, &rects, points);
+                }
+                let found = M::normals::<S>(&numbers, &rects, error, windows);
+                let plain = found.doubtful & windows;
+                let [px, py, pz, _] = by_number::<S>(rings.eight(x, y));
+                let viewpoint = self.options.viewpoint;
+                let (sure, here) = (windows & !plain, [px, py, pz]);
+                let mut normals =
+                    Octet::of::<S>(found.normal, found.curvature, here, viewpoint, sure);
+                for lane in Bits(plain) {
+                    normals.put(lane, self.plain((x + lane, y), radii[x + lane] as usize));
+                }
+                sink.write(x, y, count, &normals, M::CURVATURE);
+            }
+        }
+    }
+
+    /// The plain form of one pixel.
+    #[cold]
+    fn plain(&self, (x, y): (usize, usize), radius: usize) -> Estimate {
+        let points = Cleaned { points: self.points, zero_is_missing: self.options.zero_is_missing };
+        let rect = window((x, y), radius, self.points.width(), self.points.height());
+        let found = plain_estimate(self.options.method, &points, &rect);
+        let normal = turn_to_viewpoint(found.normal, points.at(x, y), self.options.viewpoint);
+        Estimate { normal, ..found }
+    }
+}
