@@ -303,6 +303,8 @@ typedef struct iine_maps {
 
 
 
+
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus

@@ -34,7 +34,7 @@ pub(crate) fn plane_of(points: impl Iterator<Item = [f64; 3]>) -> Option<(Estima
 
 /// The eigenvalues of the covariance matrix (Eq. 16) of the finite points in a rectangle, ascending; none if there
 /// are no points.
-pub(crate) fn eigenvalues(cloud: &Cloud, rect: &Rect) -> Option<[f64; 3]> {
+pub(crate) fn eigenvalues(cloud: &impl CleanPoints, rect: &Rect) -> Option<[f64; 3]> {
     let (scatter, count) = scatter(cloud.finite(rect));
     (count > 0.0).then(|| eigen(&scatter).0.map(|value| value / count))
 }
