@@ -50,8 +50,9 @@ const CONVERGED: f64 = 1e-3;
 /// A normal is doubtful if the error of the sums could turn it by more than 1e-5.
 const DOUBT_SUMS: f64 = 1e5;
 
-/// The least product of the eigenvalues' distances (of a matrix of trace 1) for a plane in doubles.
-const DOUBT_PLANE: f64 = 1e-9;
+/// The least product of the smallest eigenvalue's distances from the others (of a matrix of trace 1): the rounding of
+/// the determinant, some 1e-16, over its square turns the normal.
+const DOUBT_PLANE: f64 = 1e-5;
 
 impl Moments {
     /// Where the row at a place of the ring starts; its planes are a stride apart.
@@ -258,8 +259,8 @@ impl Sums for Moments {
 }
 
 /// The eigenvector of the smallest eigenvalue: the least root of the characteristic polynomial by one step of
-/// Laguerre's method from 0 and Newton steps, then a column of the adjugate. `error` is what the rounding errors of the sums
-/// of all but `fresh` lanes stay below; other lanes than `lanes` mean nothing.
+/// Laguerre's method from 0 and Newton steps, then a column of the adjugate. `error` is what the rounding errors of
+/// the sums of all but `fresh` lanes stay below; other lanes than `lanes` mean nothing.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
