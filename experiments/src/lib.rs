@@ -1,4 +1,10 @@
-//! What the experiments share: modes to compare, and errors by band with coverage.
+//! What the experiments share: modes to compare, errors by band with coverage, files that programs in other
+//! languages read and write, and plots.
 
 pub mod errors;
+pub mod exchange;
 pub mod modes;
+pub mod parallel;
+pub mod plot;
+pub mod ranking;
+pub mod table;
