@@ -3,7 +3,7 @@
 //
 // usage: pcl_normals NAME.cloud STEP METHOD...
 //   STEP    kNN at every STEP-th pixel of every STEP-th row only
-//   METHOD  kNN-K for the K nearest neighbours; PCL-COV-S, PCL-A3G-S, PCL-ADC-S or PCL-S3G-S for
+//   METHOD  PCL-kNN-K for the K nearest neighbours; PCL-COV-S, PCL-A3G-S, PCL-ADC-S or PCL-S3G-S for
 //           IntegralImageNormalEstimation with smoothing size S
 
 #include <pcl/features/integral_image_normal.h>
@@ -134,7 +134,7 @@ main (int argc, char** argv)
       fail ("not a method with its size, or not a step: " + name);
     const std::string method = name.substr (0, dash);
     const double milliseconds =
-        method == "kNN" ? byNeighbours (size, step, cloud, normals)
+        method == "PCL-kNN" ? byNeighbours (size, step, cloud, normals)
                         : byIntegralImages (method, static_cast<float> (size), cloud, normals);
     write (prefix + "." + name + ".normals", normals);
     std::printf ("%s,%.3f\n", name.c_str (), milliseconds);

@@ -3,8 +3,10 @@
 
 pub mod errors;
 pub mod exchange;
+pub mod figures;
 pub mod modes;
 pub mod parallel;
+pub mod picture;
 pub mod plot;
 pub mod ranking;
 pub mod table;

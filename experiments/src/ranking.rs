@@ -129,13 +129,14 @@ fn standings(tables: &[(&str, Vec<Line>)]) -> String {
                 let verdict = match margin {
                     _ if margin > LEVEL => format!("ahead by {margin:.2}"),
                     _ if margin >= -LEVEL => "level".to_owned(),
-                    _ => format!("**behind by {:.2}**", -margin),
+                    _ if margin.is_finite() => format!("**behind by {:.2}**", -margin),
+                    _ => "**covers less**".to_owned(),
                 };
                 let show = |line: &Line| {
                     let values = line.bands[band];
                     format!("{} {:.2} at {:.2} %", line.who, values[measure], values[COVERAGE])
                 };
-                let ours = ours.map_or("none covers as much".to_owned(), show);
+                let ours = ours.map_or("-".to_owned(), show);
                 rows += &format!(
                     "| {noise} | {band_name} | {measure_name} | {verdict} | {ours} | {} |\n",
                     show(peer)

@@ -1,0 +1,124 @@
+//! The figures of the paper from the lines that the experiments printed, and what they come to.
+//!
+//! A method's name ends with the size of its window: the side, or for kNN the number of points.
+
+use crate::plot::{Axis, Panel, Scale, svg};
+use crate::table::Row;
+
+const KNN: &str = "PCL-kNN";
+const SDC: &str = "iine SDC";
+const CM: &str = "iine CM";
+const POINTS: Axis = Axis { label: "points in the window", scale: Scale::Log };
+
+/// A name without the size, and how many points the window has.
+fn name_and_points(who: &str) -> Result<(String, f64), String> {
+    let parsed = who.rsplit_once('-').and_then(|(name, size)| Some((name, size.parse().ok()?)));
+    let (name, size): (&str, f64) = parsed.ok_or(format!("no size of a window in {who}"))?;
+    Ok((name.to_owned(), if name == KNN { size } else { size * size }))
+}
+
+/// Curves by name.
+type Curves = Vec<(String, Vec<(f64, f64)>)>;
+
+fn curves(values: impl Iterator<Item = (String, f64)>) -> Result<Curves, String> {
+    let mut curves: Curves = Vec::new();
+    for (who, value) in values {
+        let (name, points) = name_and_points(&who)?;
+        match curves.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, curve)) => curve.push((points, value)),
+            None => curves.push((name, vec![(points, value)])),
+        }
+    }
+    Ok(curves)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Times and what a figure says, or what is wrong with its lines.
+type Drawn = Result<(String, String), String>;
+
+/// Fig. 4 from lines "WHO,MILLISECONDS", of which the medians count: the plot, and what it says.
+pub fn times(lines: &str) -> Drawn {
+    let mut all: Vec<(String, Vec<f64>)> = Vec::new();
+    for line in lines.lines() {
+        let (who, time) = line.split_once(',').ok_or(format!("not a time: {line}"))?;
+        let time: f64 = time.parse().map_err(|_| format!("not a time: {line}"))?;
+        match all.iter_mut().find(|(known, _)| known == who) {
+            Some((_, times)) => times.push(time),
+            None => all.push((who.to_owned(), vec![time])),
+        }
+    }
+    let curves = curves(all.into_iter().map(|(who, times)| (who, median(times))))?;
+    let mut text = "| ms, one thread | smallest window | largest window | slowest over fastest |\n\
+                    |---|---:|---:|---:|\n"
+        .to_owned();
+    for (name, curve) in &curves {
+        let (first, last) = (curve[0], curve[curve.len() - 1]);
+        let slowest = curve.iter().map(|point| point.1).fold(0.0, f64::max);
+        let fastest = curve.iter().map(|point| point.1).fold(f64::INFINITY, f64::min);
+        text += &format!(
+            "| {name} | {:.1} ({} points) | {:.1} ({} points) | {:.1} |\n",
+            first.1,
+            first.0,
+            last.1,
+            last.0,
+            slowest / fastest
+        );
+    }
+    let y = Axis { label: "milliseconds", scale: Scale::Log };
+    let panel = Panel { title: "Time, one thread".to_owned(), x: POINTS, y, curves };
+    Ok((svg(&[panel], 1), text))
+}
+
+/// Fig. 5 (noise "0") or Fig. 8 (all others) from scores: a column of plots for every noise, the upper one of the
+/// whole image and the lower one away from depth edges and creases; and what they say.
+pub fn errors(rows: &[Row], noises: &[&str]) -> Drawn {
+    let mut panels = Vec::new();
+    let mut text = String::new();
+    for (band, place) in [("all", "whole image"), ("elsewhere", "away from edges and creases")] {
+        for noise in noises {
+            let rows: Vec<&Row> =
+                rows.iter().filter(|r| r.noise == *noise && r.band == band).collect();
+            let curves = curves(rows.iter().map(|row| (row.who.clone(), row.mean)))?;
+            let title = match *noise {
+                "0" => format!("No noise, {place}"),
+                sigma => format!("Noise in z of {sigma} m, {place}"),
+            };
+            text += &table(&title, &curves, &rows);
+            let y = Axis { label: "mean error in degrees", scale: Scale::Linear };
+            panels.push(Panel { title, x: POINTS, y, curves });
+        }
+    }
+    Ok((svg(&panels, noises.len()), text))
+}
+
+/// The errors by method and window, with the coverage of the largest window.
+fn table(title: &str, curves: &Curves, rows: &[&Row]) -> String {
+    let Some((_, first)) = curves.first() else { return String::new() };
+    let heads: Vec<String> = first.iter().map(|(points, _)| format!("{points} points")).collect();
+    let mut text =
+        format!("\n{title}: mean error in degrees\n\n| | {} | cover % |\n", heads.join(" | "));
+    text += &format!("|---|{}\n", "---:|".repeat(heads.len() + 1));
+    for (name, curve) in curves {
+        let errors: Vec<String> = curve.iter().map(|(_, error)| format!("{error:.2}")).collect();
+        let last = rows.iter().rev().find(|row| row.who.starts_with(name.as_str()));
+        let coverage = last.map_or(f64::NAN, |row| 100.0 * row.coverage());
+        text += &format!("| {name} | {} | {coverage:.1} |\n", errors.join(" | "));
+    }
+    for other in [CM, KNN] {
+        text += &ratio(curves, other);
+    }
+    text
+}
+
+/// How many times another method's error is SDC's.
+fn ratio(curves: &Curves, other: &str) -> String {
+    let curve = |name: &str| curves.iter().find(|(known, _)| known == name).map(|(_, curve)| curve);
+    let Some((sdc, other_curve)) = curve(SDC).zip(curve(other)) else { return String::new() };
+    let ratios = sdc.iter().zip(other_curve).map(|(sdc, other)| other.1 / sdc.1);
+    let (least, most) = ratios.fold((f64::INFINITY, 0f64), |(a, b), r| (a.min(r), b.max(r)));
+    format!("\nThe error of {other} is {least:.2} to {most:.2} times that of SDC.\n")
+}
