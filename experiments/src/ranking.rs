@@ -10,8 +10,10 @@ const SHOWN: usize = BANDS.len() - 1;
 /// The columns of a band; of the errors less is better, of the coverage more.
 const MEASURES: [&str; 4] = ["mean", "median", "folded", "cover %"];
 const COVERAGE: usize = 3;
-/// Degrees, or percent, that make no difference.
+/// Degrees that make no difference.
 const LEVEL: f64 = 0.005;
+/// Points in a hundred that make no difference in coverage: at most a few pixels that float alone before an edge.
+const COVERED: f64 = 0.1;
 
 /// One line of a table: whose normals, and for every band the means over the scenes of every measure.
 struct Line<'a> {
@@ -25,7 +27,7 @@ impl Line<'_> {
     }
 
     fn covers_as_much(&self, other: &Line, band: usize) -> bool {
-        self.bands[band][COVERAGE] >= other.bands[band][COVERAGE] - LEVEL
+        self.bands[band][COVERAGE] >= other.bands[band][COVERAGE] - COVERED
     }
 }
 
@@ -83,7 +85,8 @@ fn table(noise: &str, lines: &[Line]) -> String {
         out += &format!("| {} |", line.who);
         for band in 0..SHOWN {
             for measure in 0..MEASURES.len() {
-                let cell = format!("{:.2}", line.bands[band][measure]);
+                let value = line.bands[band][measure];
+                let cell = if value.is_nan() { "-".to_owned() } else { format!("{value:.2}") };
                 let is_best = best(band, measure).as_ref() == Some(&cell);
                 out += &if is_best { format!(" **{cell}** |") } else { format!(" {cell} |") };
             }
