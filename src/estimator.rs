@@ -58,6 +58,13 @@ impl Estimator {
         self.isa == Isa::Scalar || points.width().min(points.height()) < SMALLEST_IMAGE
     }
 
+    /// Whether the paper's windows alone are asked for, and not their plain form.
+    fn is_fast_paper(&self, points: &Points) -> bool {
+        let Options { semantics, one_sided_windows, crease_windows, .. } = self.options;
+        let alone = !(one_sided_windows || crease_windows);
+        semantics == Semantics::Paper && alone && !self.is_plain(points)
+    }
+
     /// The options.
     pub fn options(&self) -> &Options {
         &self.options
@@ -78,6 +85,10 @@ impl Estimator {
             return Err(Error::Size);
         }
         normals.check_disjoint(points)?;
+        if self.is_fast_paper(points) {
+            let (options, scratch) = (&self.options, &mut self.scratch);
+            return fast::paper::compute(self.isa, points, options, None, normals, scratch);
+        }
         if self.options.is_beyond_pcl() {
             for (at, estimate) in self.estimates(points).into_iter().enumerate() {
                 let (x, y) = (at % points.width(), at / points.width());
@@ -127,6 +138,11 @@ impl Estimator {
             return Err(Error::Index);
         }
         normals.check_disjoint(points)?;
+        if self.is_fast_paper(points) {
+            let (options, scratch) = (&self.options, &mut self.scratch);
+            let indices = Some(indices);
+            return fast::paper::compute(self.isa, points, options, indices, normals, scratch);
+        }
         if self.options.is_beyond_pcl() {
             let estimates = self.estimates(points);
             for (k, &index) in indices.iter().enumerate() {

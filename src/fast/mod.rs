@@ -8,6 +8,8 @@ mod arithmetic;
 mod half_windows;
 mod lanes;
 mod moments;
+pub(crate) mod paper;
+mod paths;
 mod planes;
 mod sink;
 mod strips;
@@ -21,6 +23,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use half_windows::HalfWindows;
 use lanes::Lanes;
 use moments::Moments;
+use paths::Task;
 use planes::{Frame, Planes};
 use sink::Sink;
 use strips::Strips;
@@ -53,6 +56,7 @@ pub(crate) struct Scratch {
     each: Vec<Mutex<WorkerScratch>>,
     listed: Vec<(u32, u32)>,
     chunks: Vec<Chunk>,
+    paper: paper::Scratch,
 }
 
 /// What one worker needs.
@@ -65,6 +69,7 @@ struct WorkerScratch {
     strips: Strips<false>,
     simple_strips: Strips<true>,
     half_windows: HalfWindows,
+    paper: paper::WorkerScratch,
 }
 
 impl Scratch {
@@ -74,6 +79,7 @@ impl Scratch {
         self.rows.capacity() * size_of::<Lanes>()
             + self.listed.capacity() * size_of::<(u32, u32)>()
             + self.chunks.capacity() * size_of::<Chunk>()
+            + self.paper.size()
             + each
     }
 }
@@ -86,6 +92,7 @@ impl WorkerScratch {
             + self.strips.size()
             + self.simple_strips.size()
             + self.half_windows.size()
+            + self.paper.size()
     }
 }
 
@@ -122,7 +129,7 @@ pub(crate) fn compute(
 ) -> Result<(), Error> {
     scratch.workers.prepare(options.threads)?;
     let (width, height) = (points.width(), points.height());
-    let Scratch { workers, rows, each, listed, chunks } = scratch;
+    let Scratch { workers, rows, each, listed, chunks, .. } = scratch;
     let count = workers.count();
     each.resize_with(count.max(each.len()), Mutex::default);
 
@@ -135,7 +142,7 @@ pub(crate) fn compute(
     share_out(height, count, reach, chunks);
     let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
     let length = row_length(width);
-    reserve(rows, swept * length)?;
+    reserve(rows, swept * length, Lanes::ZERO)?;
     let limit = job.sweep(workers, each, chunks, &mut rows[..swept * length]);
 
     let reach = job.reach(limit);
@@ -145,16 +152,7 @@ pub(crate) fn compute(
         let chunk = &chunks[y / per_chunk];
         sides(rows, width, chunk.start + y - chunk.swept.start)
     };
-    let sink = match indices {
-        None => Sink::All(normals),
-        Some(indices) => {
-            listed.clear();
-            listed.try_reserve(indices.len()).map_err(|_| Error::OutOfMemory)?;
-            listed.extend(indices.iter().zip(0..).map(|(index, at)| (*index as u32, at)));
-            listed.sort_unstable();
-            Sink::Listed { normals, listed, width }
-        }
-    };
+    let sink = Sink::new(normals, indices, width, listed)?;
     if job.tiles(workers, each, reach, limit, &sides, &sink).is_err() {
         let limit = job.largest_coordinate();
         // No coordinate is beyond this limit.
@@ -164,10 +162,10 @@ pub(crate) fn compute(
 }
 
 /// Grows a buffer to `length` elements.
-fn reserve(rows: &mut Vec<Lanes>, length: usize) -> Result<(), Error> {
+fn reserve<T: Clone>(rows: &mut Vec<T>, length: usize, zero: T) -> Result<(), Error> {
     if rows.len() < length {
         rows.try_reserve(length - rows.len()).map_err(|_| Error::OutOfMemory)?;
-        rows.resize(length, Lanes::ZERO);
+        rows.resize(length, zero);
     }
     Ok(())
 }
@@ -240,8 +238,9 @@ impl Job<'_> {
             // SAFETY: chunks have rows of their own.
             let rows = unsafe { rows.part(places) };
             let sweep = &mut lock(&each[worker]).sweep;
+            let task = SweepTask { job: self, chunk, rows, sweep };
             // SAFETY: the processor has the instruction set of the job.
-            let largest = unsafe { paths::sweep(self, chunk, rows, sweep) };
+            let largest = unsafe { paths::run(self.isa, task) };
             // Positive floats are in the order of their bits.
             limit.fetch_max(largest.to_bits(), Ordering::Relaxed);
         });
@@ -288,8 +287,9 @@ impl Job<'_> {
                 whole_points: self.whole_points,
             };
             let scratch = &mut lock(&each[worker]);
+            let task = TileTask { tile: &tile, scratch, sides, sink };
             // SAFETY: the processor has the instruction set of the job, and tiles do not share pixels.
-            if unsafe { paths::tile(self.isa, &tile, scratch, sides, sink) }.is_err() {
+            if unsafe { paths::run(self.isa, task) }.is_err() {
                 beyond.store(true, Ordering::Relaxed);
             }
         });
@@ -304,135 +304,62 @@ impl Job<'_> {
     }
 }
 
-/// The sweeps over one chunk of rows.
-///
-/// # Safety
-/// The processor has the instruction set of `S`.
-#[inline(always)]
-unsafe fn sweep<S: Simd>(job: &Job, chunk: &Chunk, rows: &mut [Lanes], sweep: &mut Sweep) -> f32 {
-    let mut windows = WindowRows::new(job.image.width, rows);
-    let swept = (chunk.swept.start, chunk.swept.len());
-    // SAFETY: as the caller's.
-    unsafe {
-        let largest = windows.sweep_down::<S>(job.points, job.options, swept, sweep);
-        windows.sweep_up::<S>(job.points, job.options, swept, sweep);
-        largest
-    }
+/// The sweeps over one chunk of rows, into the map's rows of the chunk. Gives the largest magnitude of a finite depth.
+struct SweepTask<'a> {
+    job: &'a Job<'a>,
+    chunk: &'a Chunk,
+    rows: &'a mut [Lanes],
+    sweep: &'a mut Sweep,
 }
 
-/// One tile, with the sums of its method.
-///
-/// # Safety
-/// The processor has the instruction set of `S`; no one else writes the tile's pixels.
-#[inline(always)]
-unsafe fn tile<'r, S: Simd>(
-    tile: &Tile,
-    scratch: &mut WorkerScratch,
-    sides: &impl Fn(usize) -> &'r [f32],
-    sink: &Sink,
-) -> Result<(), BeyondLimit> {
-    let WorkerScratch { frame, planes, moments, strips, simple_strips, half_windows, .. } = scratch;
-    // SAFETY: as the caller's.
-    unsafe {
-        match tile.options.method {
-            Method::CovarianceMatrix => tile.compute::<S, _>(frame, planes, moments, sides, sink),
-            Method::Average3DGradient => tile.compute::<S, _>(frame, planes, strips, sides, sink),
-            Method::AverageDepthChange => {
-                tile.compute::<S, _>(frame, planes, half_windows, sides, sink)
-            }
-            Method::Simple3DGradient => {
-                tile.compute::<S, _>(frame, planes, simple_strips, sides, sink)
-            }
+impl Task for SweepTask<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) -> f32 {
+        let SweepTask { job, chunk, rows, sweep } = self;
+        let mut windows = WindowRows::new(job.image.width, rows);
+        let swept = (chunk.swept.start, chunk.swept.len());
+        // SAFETY: as the caller's.
+        unsafe {
+            let largest = windows.sweep_down::<S>(job.points, job.options, swept, sweep);
+            windows.sweep_up::<S>(job.points, job.options, swept, sweep);
+            largest
         }
     }
 }
 
-/// The outermost functions, each compiled for its instruction set.
-mod paths {
-    use super::*;
-    use crate::simd::portable::Portable;
-    #[cfg(target_arch = "x86_64")]
-    use crate::simd::x86::{Avx2, Sse2};
+/// One tile, with the sums of its method; no one else writes the tile's pixels.
+struct TileTask<'a, F> {
+    tile: &'a Tile<'a>,
+    scratch: &'a mut WorkerScratch,
+    sides: &'a F,
+    sink: &'a Sink<'a>,
+}
 
-    macro_rules! path {
-        ($name:ident, $simd:ty $(, $feature:literal)?) => {
-            mod $name {
-                use super::*;
+impl<'r, F: Fn(usize) -> &'r [f32]> Task for TileTask<'_, F> {
+    type Output = Result<(), BeyondLimit>;
 
-                /// # Safety
-                /// The processor has this instruction set.
-                $(#[target_feature(enable = $feature)])?
-                pub unsafe fn sweep(job: &Job, chunk: &Chunk, rows: &mut [Lanes], sweep: &mut Sweep) -> f32 {
-                    // SAFETY: as the caller's.
-                    unsafe { super::super::sweep::<$simd>(job, chunk, rows, sweep) }
-                }
-
-                /// # Safety
-                /// The processor has this instruction set; no one else writes the tile's pixels.
-                $(#[target_feature(enable = $feature)])?
-                pub unsafe fn tile<'r>(
-                    tile: &Tile,
-                    scratch: &mut WorkerScratch,
-                    sides: &impl Fn(usize) -> &'r [f32],
-                    sink: &Sink,
-                ) -> Result<(), BeyondLimit> {
-                    // SAFETY: as the caller's.
-                    unsafe { super::super::tile::<$simd>(tile, scratch, sides, sink) }
-                }
-            }
-        };
-    }
-
-    path!(portable, Portable);
-    #[cfg(target_arch = "x86_64")]
-    path!(sse2, Sse2);
-    #[cfg(target_arch = "x86_64")]
-    path!(avx2, Avx2, "avx2");
-    #[cfg(target_arch = "x86_64")]
-    path!(avx512, Avx2, "avx2,avx512f,avx512vl,avx512dq,avx512bw");
-    #[cfg(target_arch = "aarch64")]
-    path!(neon, crate::simd::neon::Neon, "neon");
-
-    /// # Safety
-    /// The processor has the instruction set of the job.
-    pub unsafe fn sweep(job: &Job, chunk: &Chunk, rows: &mut [Lanes], scratch: &mut Sweep) -> f32 {
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) -> Result<(), BeyondLimit> {
+        let TileTask { tile, scratch, sides, sink } = self;
+        let WorkerScratch { frame, planes, moments, strips, simple_strips, half_windows, .. } =
+            scratch;
         // SAFETY: as the caller's.
         unsafe {
-            match job.isa {
-                #[cfg(target_arch = "x86_64")]
-                Isa::Sse2 => sse2::sweep(job, chunk, rows, scratch),
-                #[cfg(target_arch = "x86_64")]
-                Isa::Avx2 => avx2::sweep(job, chunk, rows, scratch),
-                #[cfg(target_arch = "x86_64")]
-                Isa::Avx512 => avx512::sweep(job, chunk, rows, scratch),
-                #[cfg(target_arch = "aarch64")]
-                Isa::Neon => neon::sweep(job, chunk, rows, scratch),
-                _ => portable::sweep(job, chunk, rows, scratch),
-            }
-        }
-    }
-
-    /// # Safety
-    /// The processor has the instruction set; no one else writes the tile's pixels.
-    pub unsafe fn tile<'r>(
-        isa: Isa,
-        tile: &Tile,
-        scratch: &mut WorkerScratch,
-        sides: &impl Fn(usize) -> &'r [f32],
-        sink: &Sink,
-    ) -> Result<(), BeyondLimit> {
-        // SAFETY: as the caller's.
-        unsafe {
-            match isa {
-                #[cfg(target_arch = "x86_64")]
-                Isa::Sse2 => sse2::tile(tile, scratch, sides, sink),
-                #[cfg(target_arch = "x86_64")]
-                Isa::Avx2 => avx2::tile(tile, scratch, sides, sink),
-                #[cfg(target_arch = "x86_64")]
-                Isa::Avx512 => avx512::tile(tile, scratch, sides, sink),
-                #[cfg(target_arch = "aarch64")]
-                Isa::Neon => neon::tile(tile, scratch, sides, sink),
-                _ => portable::tile(tile, scratch, sides, sink),
+            match tile.options.method {
+                Method::CovarianceMatrix => {
+                    tile.compute::<S, _>(frame, planes, moments, sides, sink)
+                }
+                Method::Average3DGradient => {
+                    tile.compute::<S, _>(frame, planes, strips, sides, sink)
+                }
+                Method::AverageDepthChange => {
+                    tile.compute::<S, _>(frame, planes, half_windows, sides, sink)
+                }
+                Method::Simple3DGradient => {
+                    tile.compute::<S, _>(frame, planes, simple_strips, sides, sink)
+                }
             }
         }
     }

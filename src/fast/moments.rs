@@ -26,8 +26,8 @@ pub(crate) struct Moments {
 
 /// The moments of windows, and their numbers of points.
 pub(crate) struct WindowMoments<T> {
-    sums: [T; CHANNELS],
-    count: T,
+    pub sums: [T; CHANNELS],
+    pub count: T,
 }
 
 impl<T: Copy> Clone for WindowMoments<T> {
@@ -218,8 +218,6 @@ impl Sums for Moments {
         }
     }
 
-    /// The eigenvector of the smallest eigenvalue: the least root of the characteristic polynomial by one step of
-    /// Laguerre's method from 0 and Newton steps, then a column of the adjugate.
     #[inline(always)]
     unsafe fn estimate<S: Simd>(
         &self,
@@ -229,68 +227,82 @@ impl Sums for Moments {
         lanes: u32,
     ) -> Found<S> {
         // SAFETY: as the caller's.
-        unsafe {
-            let one = Doubles::<S>::splat(1.0);
-            let [x, y, z, xx, xy, xz, yy, yz, zz] = moments.sums;
-            let share = one / moments.count;
-            let (mx, my, mz) = (x * share, y * share, z * share);
-            let (xx, xy, xz) = (xx - x * mx, xy - x * my, xz - x * mz);
-            let (yy, yz, zz) = (yy - y * my, yz - y * mz, zz - z * mz);
-            // Trace 1.
-            let trace = xx + yy + zz;
-            let scale = one / trace;
-            let (xx, xy, xz) = (xx * scale, xy * scale, xz * scale);
-            let (yy, yz, zz) = (yy * scale, yz * scale, zz * scale);
+        unsafe { plane(moments, self.error, lanes) }
+    }
+}
 
-            // value^3 - value^2 + c1 value - c0 = 0
-            let (minor_x, minor_y, minor_z) =
-                (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
-            let c1 = minor_x + minor_y + minor_z;
-            let c0 = xx * minor_x + xy * (xz * yz - xy * zz) + xz * (xy * yz - xz * yy);
-            let mut value = {
-                let (c0, c1) = (c0.narrow(), c1.narrow());
-                let square = Floats::splat(4.0) * c1 * c1 - Floats::splat(12.0) * c0;
-                let root = square.max(Floats::splat(0.0)).sqrt();
-                (Floats::splat(3.0) * c0 / (c1 + root)).widen()
-            };
-            let (two, three) = (one + one, one + one + one);
-            let (zero, converged) = (Doubles::splat(0.0), Doubles::splat(CONVERGED));
-            let (mut slope, mut unsettled) = (zero, lanes);
-            for _ in 0..STEPS {
-                slope = (three * value - two) * value + c1;
-                let step = (((value - one) * value + c1) * value - c0) / slope;
-                value = value - step;
-                unsettled = !step.max(zero - step).lt(converged * slope) & lanes;
-                if unsettled == 0 {
-                    break;
-                }
-            }
-            let value = value.max(zero);
+/// The eigenvector of the smallest eigenvalue: the least root of the characteristic polynomial by one step of
+/// Laguerre's method from 0 and Newton steps, then a column of the adjugate. `error` is what the sums' rounding errors
+/// stay below; other lanes than `lanes` mean nothing.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+pub(crate) unsafe fn plane<S: Simd>(
+    moments: &WindowMoments<Doubles<S>>,
+    error: f64,
+    lanes: u32,
+) -> Found<S> {
+    // SAFETY: as the caller's.
+    unsafe {
+        let one = Doubles::<S>::splat(1.0);
+        let [x, y, z, xx, xy, xz, yy, yz, zz] = moments.sums;
+        let share = one / moments.count;
+        let (mx, my, mz) = (x * share, y * share, z * share);
+        let (xx, xy, xz) = (xx - x * mx, xy - x * my, xz - x * mz);
+        let (yy, yz, zz) = (yy - y * my, yz - y * mz, zz - z * mz);
+        // Trace 1.
+        let trace = xx + yy + zz;
+        let scale = one / trace;
+        let (xx, xy, xz) = (xx * scale, xy * scale, xz * scale);
+        let (yy, yz, zz) = (yy * scale, yz * scale, zz * scale);
 
-            // The adjugate of the matrix less the eigenvalue: each column is along the eigenvector.
-            let (xx, yy, zz) = (xx - value, yy - value, zz - value);
-            let (a_xx, a_yy, a_zz) = (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
-            let (a_xy, a_xz, a_yz) = (xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz);
-            // The column with the longest diagonal element, scaled by it.
-            let best_xy = a_xx.max(a_yy);
-            let scale = one / best_xy.max(a_zz);
-            let columns = [[a_xx, a_xy, a_xz], [a_xy, a_yy, a_yz], [a_xz, a_yz, a_zz]];
-            let mut n = [Floats::splat(0.0); 3];
-            for c in 0..3 {
-                let of_xy = a_xx.select_lt(a_yy, columns[1][c], columns[0][c]);
-                n[c] = (best_xy.select_lt(a_zz, columns[2][c], of_xy) * scale).narrow();
+        // value^3 - value^2 + c1 value - c0 = 0
+        let (minor_x, minor_y, minor_z) = (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
+        let c1 = minor_x + minor_y + minor_z;
+        let c0 = xx * minor_x + xy * (xz * yz - xy * zz) + xz * (xy * yz - xz * yy);
+        let mut value = {
+            let (c0, c1) = (c0.narrow(), c1.narrow());
+            let square = Floats::splat(4.0) * c1 * c1 - Floats::splat(12.0) * c0;
+            let root = square.max(Floats::splat(0.0)).sqrt();
+            (Floats::splat(3.0) * c0 / (c1 + root)).widen()
+        };
+        let (two, three) = (one + one, one + one + one);
+        let (zero, converged) = (Doubles::splat(0.0), Doubles::splat(CONVERGED));
+        let (mut slope, mut unsettled) = (zero, lanes);
+        for _ in 0..STEPS {
+            slope = (three * value - two) * value + c1;
+            let step = (((value - one) * value + c1) * value - c0) / slope;
+            value = value - step;
+            unsettled = !step.max(zero - step).lt(converged * slope) & lanes;
+            if unsettled == 0 {
+                break;
             }
-            let scale = Floats::splat(1.0) / dot(n, n).sqrt();
-            let least = Doubles::splat(DOUBT_SUMS * self.error);
-            // Where the points lie on a line, the steps may end at the largest eigenvalue instead.
-            let is_smallest = value.lt(Doubles::splat(1.0 / 3.0));
-            let sure =
-                Doubles::splat(DOUBT_PLANE).lt(slope) & least.lt(slope * trace) & is_smallest;
-            Found {
-                normal: [n[0] * scale, n[1] * scale, n[2] * scale],
-                curvature: value.narrow(),
-                doubtful: !sure | unsettled,
-            }
+        }
+        let value = value.max(zero);
+
+        // The adjugate of the matrix less the eigenvalue: each column is along the eigenvector.
+        let (xx, yy, zz) = (xx - value, yy - value, zz - value);
+        let (a_xx, a_yy, a_zz) = (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
+        let (a_xy, a_xz, a_yz) = (xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz);
+        // The column with the longest diagonal element, scaled by it.
+        let best_xy = a_xx.max(a_yy);
+        let scale = one / best_xy.max(a_zz);
+        let columns = [[a_xx, a_xy, a_xz], [a_xy, a_yy, a_yz], [a_xz, a_yz, a_zz]];
+        let mut n = [Floats::splat(0.0); 3];
+        for c in 0..3 {
+            let of_xy = a_xx.select_lt(a_yy, columns[1][c], columns[0][c]);
+            n[c] = (best_xy.select_lt(a_zz, columns[2][c], of_xy) * scale).narrow();
+        }
+        let scale = Floats::splat(1.0) / dot(n, n).sqrt();
+        let least = Doubles::splat(DOUBT_SUMS * error);
+        // Where the points lie on a line, the steps may end at the largest eigenvalue instead.
+        let is_smallest = value.lt(Doubles::splat(1.0 / 3.0));
+        let sure = Doubles::splat(DOUBT_PLANE).lt(slope) & least.lt(slope * trace) & is_smallest;
+        Found {
+            normal: [n[0] * scale, n[1] * scale, n[2] * scale],
+            curvature: value.narrow(),
+            doubtful: !sure | unsettled,
         }
     }
 }

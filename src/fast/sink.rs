@@ -1,6 +1,7 @@
 //! Where a tile's normals go: to every pixel, or to the places of the pixels that indices list.
 
 use super::tile::Octet;
+use crate::Error;
 use crate::cloud::Normals;
 use crate::simd::GROUP;
 
@@ -17,7 +18,22 @@ pub(crate) enum Sink<'a> {
     },
 }
 
-impl Sink<'_> {
+impl<'a> Sink<'a> {
+    /// The sink of all pixels of an image, or of those that `indices` list; `listed` is room for these.
+    pub fn new(
+        normals: &'a Normals<'a>,
+        indices: Option<&[i32]>,
+        width: usize,
+        listed: &'a mut Vec<(u32, u32)>,
+    ) -> Result<Self, Error> {
+        let Some(indices) = indices else { return Ok(Sink::All(normals)) };
+        listed.clear();
+        listed.try_reserve(indices.len()).map_err(|_| Error::OutOfMemory)?;
+        listed.extend(indices.iter().zip(0..).map(|(index, at)| (*index as u32, at)));
+        listed.sort_unstable();
+        Ok(Sink::Listed { normals, listed, width })
+    }
+
     /// The listed pixels among `count` from `(x, y)` on, with their elements.
     fn listed(&self, x: usize, y: usize, count: usize) -> &[(u32, u32)] {
         match self {

@@ -471,7 +471,7 @@ impl<'a, S: Simd> Group<'a, S> {
 }
 
 /// The set bits of a mask, lowest first.
-struct Bits(u32);
+pub(crate) struct Bits(pub u32);
 
 impl Iterator for Bits {
     type Item = usize;
@@ -498,7 +498,7 @@ impl Octet {
     }
 
     #[inline(always)]
-    fn put(&mut self, lane: usize, estimate: Estimate) {
+    pub fn put(&mut self, lane: usize, estimate: Estimate) {
         for (to, from) in self.normal.iter_mut().zip(estimate.normal) {
             to[lane] = from;
         }
@@ -510,7 +510,7 @@ impl Octet {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn of<S: Simd>(
+    pub unsafe fn of<S: Simd>(
         normal: [Floats<S>; 3],
         curvature: Floats<S>,
         point: [Floats<S>; 3],

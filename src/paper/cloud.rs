@@ -17,13 +17,8 @@ impl Cloud {
     pub fn new(points: &Points, options: &Options) -> Self {
         let (width, height) = (points.width(), points.height());
         let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-        let points: Vec<[f32; 3]> = pixels
-            .map(|(x, y)| {
-                let point = points.at(x, y);
-                let missing = !is_finite(point) || options.zero_is_missing && point == [0.0; 3];
-                if missing { [f32::NAN; 3] } else { point }
-            })
-            .collect();
+        let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
+        let points: Vec<[f32; 3]> = pixels.map(|(x, y)| cleaned.at(x, y)).collect();
         let range = options.semantics == Semantics::Paper && options.paper.depth == Depth::Range;
         let depth = |&[x, y, z]: &[f32; 3]| if range { (x * x + y * y + z * z).sqrt() } else { z };
         let depths = points.iter().map(depth).collect();
@@ -34,19 +29,41 @@ impl Cloud {
         y * self.width + x
     }
 
-    pub fn at(&self, x: usize, y: usize) -> [f32; 3] {
-        self.points[self.index(x, y)]
-    }
-
     pub fn is_missing(&self, at: usize) -> bool {
         self.depths[at].is_nan()
     }
+}
+
+/// Points by column and row; a missing one is NaN.
+pub(crate) trait CleanPoints {
+    fn at(&self, x: usize, y: usize) -> [f32; 3];
 
     /// The finite points of a rectangle, in double precision.
-    pub fn finite(&self, rect: &Rect) -> impl Iterator<Item = [f64; 3]> {
+    fn finite(&self, rect: &Rect) -> impl Iterator<Item = [f64; 3]> {
         rect.pixels()
             .map(|(x, y)| self.at(x, y))
             .filter(|point| !point[2].is_nan())
             .map(|point| point.map(f64::from))
+    }
+}
+
+impl CleanPoints for Cloud {
+    fn at(&self, x: usize, y: usize) -> [f32; 3] {
+        self.points[self.index(x, y)]
+    }
+}
+
+/// The user's points, looked at when they are asked for.
+pub(crate) struct Cleaned<'a> {
+    pub points: &'a Points<'a>,
+    pub zero_is_missing: bool,
+}
+
+impl CleanPoints for Cleaned<'_> {
+    #[inline(always)]
+    fn at(&self, x: usize, y: usize) -> [f32; 3] {
+        let point = self.points.at(x, y);
+        let missing = !is_finite(point) || self.zero_is_missing && point == [0.0; 3];
+        if missing { [f32::NAN; 3] } else { point }
     }
 }

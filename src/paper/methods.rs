@@ -1,13 +1,13 @@
 //! Step 4: a normal from the points in a rectangle. Plain forms, walking over it; sums over finite points only.
 
-use super::cloud::Cloud;
+use super::cloud::CleanPoints;
 use super::rect::Rect;
 use crate::eigen::{Symmetric3, eigen};
 use crate::methods::{Estimate, normal_of_tangents};
 use crate::options::Method;
 
 /// The estimate of a method of the paper.
-pub(crate) fn estimate(method: Method, cloud: &Cloud, rect: &Rect) -> Estimate {
+pub(crate) fn estimate(method: Method, cloud: &impl CleanPoints, rect: &Rect) -> Estimate {
     match method {
         Method::AverageDepthChange => smoothed_depth_changes(cloud, rect),
         Method::Average3DGradient => gradients(cloud, rect),
@@ -44,7 +44,7 @@ pub(crate) fn plane_of(points: impl Iterator<Item = [f64; 3]>) -> Option<(Estima
 }
 
 /// The 3-D gradient method: the cross product of the mean central differences of the points.
-fn gradients(cloud: &Cloud, rect: &Rect) -> Estimate {
+fn gradients(cloud: &impl CleanPoints, rect: &Rect) -> Estimate {
     let horizontal = mean_difference(cloud, rect, (1, 0));
     let vertical = mean_difference(cloud, rect, (0, 1));
     match horizontal.zip(vertical) {
@@ -60,15 +60,15 @@ fn gradients(cloud: &Cloud, rect: &Rect) -> Estimate {
 /// Eq. 12 is the mean of z(m + 1, n) - z(m - 1, n) over radius r - 1 around (m, n); said so, it stays right where
 /// points are missing. As printed, x and y span 2r pixels where z spans 2, which tilts every normal but a frontal
 /// one; here z is extended to the pixels that x and y span.
-fn smoothed_depth_changes(cloud: &Cloud, rect: &Rect) -> Estimate {
-    let (column, row) = (middle(&rect.x), middle(&rect.y));
+fn smoothed_depth_changes(cloud: &impl CleanPoints, rect: &Rect) -> Estimate {
+    let (column, row) = rect.middle();
     let horizontal = {
-        let finite = |x: &usize| !cloud.is_missing(cloud.index(*x, row));
+        let finite = |x: &usize| !cloud.at(*x, row)[2].is_nan();
         let span = rect.x.clone().find(finite).zip(rect.x.clone().rev().find(finite));
         tangent(cloud, rect, span.map(|(from, to)| ((from, row), (to, row), to - from)), (1, 0))
     };
     let vertical = {
-        let finite = |y: &usize| !cloud.is_missing(cloud.index(column, *y));
+        let finite = |y: &usize| !cloud.at(column, *y)[2].is_nan();
         let span = rect.y.clone().find(finite).zip(rect.y.clone().rev().find(finite));
         tangent(
             cloud,
@@ -88,7 +88,7 @@ type Span = ((usize, usize), (usize, usize), usize);
 
 /// The tangent over a span: x and y from its ends, z from the mean difference across two pixels.
 fn tangent(
-    cloud: &Cloud,
+    cloud: &impl CleanPoints,
     rect: &Rect,
     span: Option<Span>,
     step: (usize, usize),
@@ -102,10 +102,13 @@ fn tangent(
 
 /// The mean of P(m + step) - P(m - step) over the pixels m inside the rectangle's outermost rows and columns, where
 /// both points are finite; none if there is no such pair.
-fn mean_difference(cloud: &Cloud, rect: &Rect, (dx, dy): (usize, usize)) -> Option<[f64; 3]> {
-    let inner = |range: &std::ops::Range<usize>| range.start + 1..range.end.saturating_sub(1);
+fn mean_difference(
+    cloud: &impl CleanPoints,
+    rect: &Rect,
+    (dx, dy): (usize, usize),
+) -> Option<[f64; 3]> {
     let (mut sum, mut count) = ([0.0; 3], 0.0);
-    for (x, y) in (Rect { x: inner(&rect.x), y: inner(&rect.y) }).pixels() {
+    for (x, y) in rect.inner().pixels() {
         let (ahead, behind) = (cloud.at(x + dx, y + dy), cloud.at(x - dx, y - dy));
         if ahead[2].is_nan() || behind[2].is_nan() {
             continue;
@@ -116,8 +119,4 @@ fn mean_difference(cloud: &Cloud, rect: &Rect, (dx, dy): (usize, usize)) -> Opti
         count += 1.0;
     }
     (count > 0.0).then(|| sum.map(|sum| sum / count))
-}
-
-fn middle(range: &std::ops::Range<usize>) -> usize {
-    (range.start + range.end - 1) / 2
 }

@@ -11,12 +11,16 @@ mod distance;
 mod methods;
 mod one_sided;
 mod rect;
-mod smoothing_area;
+pub(crate) mod smoothing_area;
 mod summed_area;
+
+pub(crate) use cloud::{CleanPoints, Cleaned};
+pub(crate) use methods::estimate as plain_estimate;
+pub(crate) use rect::Rect;
+pub(crate) use smoothing_area::window;
 
 use cloud::Cloud;
 use depth_change::DepthChanges;
-use rect::Rect;
 use summed_area::SummedArea;
 
 use crate::cloud::Points;

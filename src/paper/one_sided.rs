@@ -4,7 +4,7 @@
 //! own surface. Where the outline of a surface is too ragged even for that, the pixel takes the normal of a pixel
 //! nearby, if it lies in its tangent plane; and where there is none, the plane through the points around it.
 
-use super::cloud::Cloud;
+use super::cloud::{CleanPoints, Cloud};
 use super::depth_change::SummedChanges;
 use super::methods::plane_of;
 use super::rect::Rect;

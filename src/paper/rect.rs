@@ -20,6 +20,18 @@ impl Rect {
         self.y.clone().flat_map(move |y| self.x.clone().map(move |x| (x, y)))
     }
 
+    /// Without the outermost rows and columns.
+    pub fn inner(&self) -> Rect {
+        let inner = |range: &Range<usize>| range.start + 1..(range.end - 1).max(range.start + 1);
+        Rect { x: inner(&self.x), y: inner(&self.y) }
+    }
+
+    /// The column and the row in the middle, the first of two.
+    pub fn middle(&self) -> (usize, usize) {
+        let middle = |range: &Range<usize>| (range.start + range.end - 1) / 2;
+        (middle(&self.x), middle(&self.y))
+    }
+
     /// The longer side.
     pub fn side(&self) -> usize {
         self.x.len().max(self.y.len())

@@ -472,10 +472,9 @@ impl Simd for Avx2 {
             let mask = _mm256_castps_si256(Self::mask(lanes));
             let low = _mm256_cvtepi32_epi64(_mm256_castsi256_si128(mask));
             let high = _mm256_cvtepi32_epi64(_mm256_extracti128_si256::<1>(mask));
-            [
-                _mm256_blendv_pd(no[0], yes[0], _mm256_castsi256_pd(low)),
-                _mm256_blendv_pd(no[1], yes[1], _mm256_castsi256_pd(high)),
-            ]
+            let mask = [_mm256_castsi256_pd(low), _mm256_castsi256_pd(high)];
+            let no = each!(_mm256_andnot_pd, mask, no);
+            each!(_mm256_or_pd, each!(_mm256_and_pd, mask, yes), no)
         }
     }
     #[inline(always)]

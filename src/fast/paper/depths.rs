@@ -1,0 +1,51 @@
+//! The depths of a row of points, missing ones NaN.
+
+use crate::cloud::Points;
+use crate::options::{Depth, Options};
+use crate::simd::{GROUP, Simd};
+
+/// Elements of a row of depths: the width, and a group of NaN or more behind it.
+pub(crate) fn row_length(width: usize) -> usize {
+    width.next_multiple_of(GROUP) + GROUP
+}
+
+/// Fills a row of depths; `planes` is room for a row of points.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+pub(crate) unsafe fn read<S: Simd>(
+    points: &Points,
+    options: &Options,
+    y: usize,
+    whole_points: bool,
+    planes: &mut Vec<f32>,
+    depths: &mut [f32],
+) {
+    let (width, stride) = (points.width(), row_length(points.width()));
+    planes.resize(3 * stride, 0.0);
+    points.read_row(y, 0..width, stride, planes, whole_points);
+    let range = options.paper.depth == Depth::Range;
+    let depths = &mut depths[..stride];
+    // SAFETY: as the caller's; the groups lie inside the planes and the depths.
+    unsafe {
+        let none = S::splat(f32::NAN);
+        let zero = S::splat(0.0);
+        for x in (0..stride - GROUP).step_by(GROUP) {
+            let plane = |c: usize| planes.as_ptr().add(c * stride + x);
+            let (px, py, pz) = (S::load(plane(0)), S::load(plane(1)), S::load(plane(2)));
+            let mut there = S::and(S::and(S::finite(px), S::finite(py)), S::finite(pz));
+            if options.zero_is_missing {
+                let origin = S::and(S::and(S::eq(px, zero), S::eq(py, zero)), S::eq(pz, zero));
+                there = S::and_not(origin, there);
+            }
+            let depth = if range {
+                S::sqrt(S::add(S::add(S::mul(px, px), S::mul(py, py)), S::mul(pz, pz)))
+            } else {
+                pz
+            };
+            S::store(depths.as_mut_ptr().add(x), S::select(there, depth, none));
+        }
+    }
+    depths[width..].fill(f32::NAN);
+}

@@ -1,0 +1,237 @@
+//! The paper's windows and methods, fast: depths (`depths`), the radii of the windows of the whole image (`windows`),
+//! then tile by tile integral images of the method's channels (`integrals`, `methods`) and the normals (`tile`).
+
+mod depths;
+mod integrals;
+mod methods;
+mod tile;
+mod windows;
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use depths::row_length;
+use integrals::Integrals;
+use methods::{CovarianceMatrix, Gradients, MOMENTS, SmoothedDepthChanges};
+use tile::Tile;
+use windows::{Rows, Sweep, reach};
+
+use super::paths::{self, Task};
+use super::sink::Sink;
+use super::{Chunk, Parts, TILE_BYTES, TILE_ROWS, lock, reserve, share_out};
+use crate::Error;
+use crate::cloud::{Normals, Points};
+use crate::isa::Isa;
+use crate::options::{DistanceMetric, Method, Options};
+use crate::paper::PaperMaps;
+use crate::simd::{GROUP, Simd};
+
+/// Rows of the whole image: depths, and the radii of windows.
+#[derive(Debug, Default)]
+pub(crate) struct Scratch {
+    depths: Vec<f32>,
+    radii: Vec<f32>,
+}
+
+impl Scratch {
+    /// Bytes held.
+    pub fn size(&self) -> usize {
+        (self.depths.capacity() + self.radii.capacity()) * size_of::<f32>()
+    }
+}
+
+/// What one worker needs.
+#[derive(Debug, Default)]
+pub(crate) struct WorkerScratch {
+    planes: Vec<f32>,
+    sweep: Sweep,
+    moments: Integrals<MOMENTS>,
+    gradients: Integrals<8>,
+    depth_changes: Integrals<4>,
+}
+
+impl WorkerScratch {
+    /// Bytes held.
+    pub fn size(&self) -> usize {
+        self.planes.capacity() * size_of::<f32>()
+            + self.sweep.size()
+            + self.moments.size()
+            + self.gradients.size()
+            + self.depth_changes.size()
+    }
+}
+
+/// The normals of the pixels that `indices` list, or of all.
+pub(crate) fn compute(
+    isa: Isa,
+    points: &Points,
+    options: &Options,
+    indices: Option<&[i32]>,
+    normals: &Normals,
+    scratch: &mut super::Scratch,
+) -> Result<(), Error> {
+    scratch.workers.prepare(options.threads)?;
+    let (width, height) = (points.width(), points.height());
+    let super::Scratch { workers, each, listed, chunks, paper, .. } = scratch;
+    let count = workers.count();
+    each.resize_with(count.max(each.len()), Default::default);
+    let length = row_length(width);
+    let whole_points = points.has_whole_points(normals);
+
+    reserve(&mut paper.depths, length * height, 0.0)?;
+    let depths = &mut paper.depths[..length * height];
+    let parts = Parts(depths.as_mut_ptr());
+    workers.for_each(height, |worker, y| {
+        let scratch = &mut lock(&each[worker]).paper;
+        // SAFETY: rows do not overlap.
+        let depths = unsafe { parts.part(y * length..(y + 1) * length) };
+        let task = DepthsTask { points, options, y, whole_points, scratch, depths };
+        // SAFETY: the processor has the instruction set.
+        unsafe { paths::run(isa, task) };
+    });
+
+    let reach = if count > 1 { reach(&options.paper) } else { height };
+    share_out(height, count, reach, chunks);
+    let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
+    reserve(&mut paper.radii, swept * length, 0.0)?;
+    let radii = &mut paper.radii[..swept * length];
+    let largest = AtomicU32::new(0);
+    if options.paper.distance_metric == DistanceMetric::Euclidean {
+        let parts = Parts(radii.as_mut_ptr());
+        workers.for_each(chunks.len(), |worker, item| {
+            let Chunk { swept, start, .. } = &chunks[item];
+            // SAFETY: chunks have rows of their own.
+            let map = unsafe { parts.part(start * length..(start + swept.len()) * length) };
+            let rows = Rows { width, first: swept.start, count: swept.len(), depths, map };
+            let sweep = &mut lock(&each[worker]).paper.sweep;
+            // SAFETY: the processor has the instruction set.
+            let radius = unsafe { paths::run(isa, SweepTask { rows, options, sweep }) };
+            largest.fetch_max(radius as u32, Ordering::Relaxed);
+        });
+    } else {
+        let maps = PaperMaps::new(points, options);
+        for Chunk { swept, start, .. } in chunks.iter() {
+            for (y, row) in swept.clone().zip(radii[start * length..].chunks_mut(length)) {
+                for (radius, exact) in
+                    row.iter_mut().zip(&maps.smoothing_radii[y * width..][..width])
+                {
+                    *radius = exact.trunc();
+                    largest.fetch_max(*radius as u32, Ordering::Relaxed);
+                }
+            }
+        }
+    }
+
+    let largest = largest.into_inner() as usize;
+    let sink = Sink::new(normals, indices, width, listed)?;
+    let per_chunk = chunks[0].own.len();
+    let (depths, radii, chunks) = (&*depths, &*radii, &*chunks);
+    let row = move |y: usize| {
+        let chunk = &chunks[y / per_chunk];
+        let at = (chunk.start + y - chunk.swept.start) * length;
+        (&depths[y * length..][..length], &radii[at..at + length])
+    };
+    let ring = (2 * largest + 2).next_power_of_two();
+    let columns = TILE_BYTES / (channels(options.method) * size_of::<f64>() * ring);
+    let columns = columns.max(4 * largest).next_multiple_of(GROUP);
+    let across = width.div_ceil(columns);
+    // Tiles of like widths.
+    let columns = width.div_ceil(across).next_multiple_of(GROUP);
+    workers.for_each(across * height.div_ceil(TILE_ROWS), |worker, item| {
+        let (first, column) = (item / across * TILE_ROWS, item % across * columns);
+        if column >= width {
+            return;
+        }
+        let tile = Tile {
+            points,
+            options,
+            columns: column..(column + columns).min(width),
+            rows: first..(first + TILE_ROWS).min(height),
+            largest,
+            row,
+        };
+        let scratch = &mut lock(&each[worker]).paper;
+        // SAFETY: the processor has the instruction set, and tiles do not share pixels.
+        unsafe { paths::run(isa, TileTask { tile: &tile, scratch, sink: &sink }) };
+    });
+    Ok(())
+}
+
+/// How many channels a method sums.
+fn channels(method: Method) -> usize {
+    match method {
+        Method::CovarianceMatrix => MOMENTS,
+        Method::AverageDepthChange => 4,
+        Method::Average3DGradient | Method::Simple3DGradient => 8,
+    }
+}
+
+/// One row of depths.
+struct DepthsTask<'a> {
+    points: &'a Points<'a>,
+    options: &'a Options,
+    y: usize,
+    whole_points: bool,
+    scratch: &'a mut WorkerScratch,
+    depths: &'a mut [f32],
+}
+
+impl Task for DepthsTask<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) {
+        let DepthsTask { points, options, y, whole_points, scratch, depths } = self;
+        // SAFETY: as the caller's.
+        unsafe { depths::read::<S>(points, options, y, whole_points, &mut scratch.planes, depths) };
+    }
+}
+
+/// The windows of some rows; gives the largest radius.
+struct SweepTask<'a> {
+    rows: Rows<'a>,
+    options: &'a Options,
+    sweep: &'a mut Sweep,
+}
+
+impl Task for SweepTask<'_> {
+    type Output = f32;
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(mut self) -> f32 {
+        // SAFETY: as the caller's.
+        unsafe { self.sweep.radii::<S>(&mut self.rows, &self.options.paper) }
+    }
+}
+
+/// One tile; no one else writes its pixels.
+struct TileTask<'a, 't, F> {
+    tile: &'t Tile<'a, F>,
+    scratch: &'t mut WorkerScratch,
+    sink: &'t Sink<'t>,
+}
+
+impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Task for TileTask<'a, '_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) {
+        let TileTask { tile, scratch, sink } = self;
+        // SAFETY: as the caller's.
+        unsafe {
+            match tile.options.method {
+                Method::CovarianceMatrix => {
+                    let method = CovarianceMatrix { origin: tile.origin() };
+                    tile.compute::<S, _, MOMENTS, MOMENTS>(&method, &mut scratch.moments, sink);
+                }
+                Method::AverageDepthChange => {
+                    let integrals = &mut scratch.depth_changes;
+                    tile.compute::<S, _, 4, 6>(&SmoothedDepthChanges, integrals, sink);
+                }
+                // The paper has no SIMPLE_3D_GRADIENT; the options' check refuses it.
+                Method::Average3DGradient | Method::Simple3DGradient => {
+                    tile.compute::<S, _, 8, 6>(&Gradients, &mut scratch.gradients, sink);
+                }
+            }
+        }
+    }
+}

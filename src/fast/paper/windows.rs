@@ -1,0 +1,290 @@
+//! Steps 1 to 3 of the paper, fast: depth changes and the distances to them along the columns in one sweep down the
+//! rows, exact distances and radii in one sweep up. The plain forms are in `paper::depth_change`, `paper::distance`
+//! and `paper::smoothing_area`.
+//!
+//! A distance matters up to the largest radius times the square root of 2 only, so that the nearest column's change
+//! is looked for that far, and no farther than the group of pixels needs.
+
+use super::depths::row_length;
+use crate::fast::planes::grow;
+use crate::options::PaperOptions;
+use crate::simd::{GROUP, Simd};
+
+/// More than any distance that matters; its square still fits a float exactly enough to stay the larger.
+const FAR: f32 = 1e6;
+
+/// How far, in pixels, a depth change can be that decides a window.
+pub(crate) fn reach(options: &PaperOptions) -> usize {
+    (f64::from(options.largest_radius + 1) * std::f64::consts::SQRT_2) as usize + 2
+}
+
+/// What a sweep needs beside its map.
+#[derive(Debug, Default)]
+pub(crate) struct Sweep {
+    /// By column: the last depth, and how many rows ago it was.
+    last: Vec<f32>,
+    gap: Vec<f32>,
+    /// The row above: masks of the depth changes to the right.
+    right: Vec<f32>,
+    /// The row below: distances along the columns.
+    below: Vec<f32>,
+    /// Squares of them, with room before and after.
+    squares: Vec<f32>,
+}
+
+/// The rows that are swept: the depths of the whole image, and the map's rows from the first one on.
+pub(crate) struct Rows<'a> {
+    pub width: usize,
+    pub first: usize,
+    pub count: usize,
+    pub depths: &'a [f32],
+    pub map: &'a mut [f32],
+}
+
+impl Rows<'_> {
+    #[inline(always)]
+    fn depths(&self, y: usize) -> &[f32] {
+        let length = row_length(self.width);
+        &self.depths[y * length..(y + 1) * length]
+    }
+
+    #[inline(always)]
+    fn map(&mut self, y: usize) -> &mut [f32] {
+        let length = row_length(self.width);
+        let start = (y - self.first) * length;
+        &mut self.map[start..start + length]
+    }
+
+    fn image_rows(&self) -> usize {
+        self.depths.len() / row_length(self.width)
+    }
+}
+
+impl Sweep {
+    /// Bytes held.
+    pub fn size(&self) -> usize {
+        let Sweep { last, gap, right, below, squares } = self;
+        [last, gap, right, below, squares].iter().map(|b| b.capacity() * size_of::<f32>()).sum()
+    }
+
+    /// Fills the map with the windows' radii, whole numbers of pixels, 0 for none. Returns the largest.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn radii<S: Simd>(&mut self, rows: &mut Rows, options: &PaperOptions) -> f32 {
+        let length = row_length(rows.width);
+        let margin = reach(options).next_multiple_of(GROUP);
+        for buffer in [&mut self.last, &mut self.gap, &mut self.right, &mut self.below] {
+            grow(buffer, length);
+        }
+        grow(&mut self.squares, length + 2 * margin);
+        // SAFETY: as the caller's.
+        unsafe {
+            self.down::<S>(rows, options);
+            self.up::<S>(rows, options, margin)
+        }
+    }
+
+    /// Depth changes, and the distances to those above in the same column.
+    ///
+    /// # Safety
+    /// As [`Sweep::radii`].
+    #[inline(always)]
+    unsafe fn down<S: Simd>(&mut self, rows: &mut Rows, options: &PaperOptions) {
+        let length = row_length(rows.width);
+        let (first, end) = (rows.first, rows.first + rows.count);
+        self.look_up(rows);
+        // SAFETY: as the caller's; all rows and buffers have the length of a row of depths.
+        unsafe {
+            self.changes_to_right::<S>(rows.depths(first), options);
+            self.below[..length].fill(FAR);
+            for y in first..end {
+                let is_last = y + 1 == rows.image_rows();
+                for x in (0..length - GROUP).step_by(GROUP) {
+                    let mut change = S::load(self.right.as_ptr().add(x));
+                    if !is_last {
+                        let last = S::load(self.last.as_ptr().add(x));
+                        let gap = S::load(self.gap.as_ptr().add(x));
+                        let depth = S::load(rows.depths(y + 1).as_ptr().add(x));
+                        change = S::or(change, is_change::<S>(last, depth, gap, options));
+                        let there = S::eq(depth, depth);
+                        S::store(self.last.as_mut_ptr().add(x), S::select(there, depth, last));
+                        let one = S::splat(1.0);
+                        let gap = S::add(S::and_not(there, gap), one);
+                        S::store(self.gap.as_mut_ptr().add(x), gap);
+                    }
+                    // `below` holds the row above here.
+                    let above = S::load(self.below.as_ptr().add(x));
+                    let distance = S::and_not(change, S::add(above, S::splat(1.0)));
+                    S::store(self.below.as_mut_ptr().add(x), distance);
+                    S::store(rows.map(y).as_mut_ptr().add(x), distance);
+                }
+                if y + 1 < end {
+                    self.changes_to_right::<S>(rows.depths(y + 1), options);
+                }
+            }
+        }
+    }
+
+    /// The last depths at or above the first row.
+    fn look_up(&mut self, rows: &Rows) {
+        for x in 0..row_length(rows.width) {
+            let above = (0..=rows.first).rev().find(|y| !rows.depths(*y)[x].is_nan());
+            self.last[x] = above.map_or(f32::NAN, |y| rows.depths(y)[x]);
+            self.gap[x] = above.map_or(1, |y| rows.first - y + 1) as f32;
+        }
+    }
+
+    /// Masks where the depth to the right is a depth change away; behind a gap, at its last pixel.
+    ///
+    /// # Safety
+    /// As [`Sweep::radii`].
+    #[inline(always)]
+    unsafe fn changes_to_right<S: Simd>(&mut self, depths: &[f32], options: &PaperOptions) {
+        let right = &mut self.right[..depths.len()];
+        let mut before = 0;
+        // SAFETY: as the caller's; a row of depths has a group behind its last one.
+        unsafe {
+            for x in (0..depths.len() - GROUP).step_by(GROUP) {
+                let depth = S::load(depths.as_ptr().add(x));
+                let next = S::load(depths.as_ptr().add(x + 1));
+                let change = is_change::<S>(depth, next, S::splat(1.0), options);
+                S::store(right.as_mut_ptr().add(x), change);
+                let there = S::bits(S::eq(depth, depth));
+                let mut behind_gap = there & !(there << 1 | before);
+                before = there >> (GROUP - 1);
+                while behind_gap != 0 {
+                    let at = x + behind_gap.trailing_zeros() as usize;
+                    behind_gap &= behind_gap - 1;
+                    mark_gap(depths, at, options, right);
+                }
+            }
+        }
+    }
+
+    /// Distances to changes above and below, then the nearest of all columns' changes, then radii.
+    ///
+    /// # Safety
+    /// As [`Sweep::radii`].
+    #[inline(always)]
+    unsafe fn up<S: Simd>(
+        &mut self,
+        rows: &mut Rows,
+        options: &PaperOptions,
+        margin: usize,
+    ) -> f32 {
+        let length = row_length(rows.width);
+        let inside = length - GROUP;
+        let (before, after) = (&mut self.below[..length], &mut self.squares[..length + 2 * margin]);
+        let (below, squares) = (before, after);
+        below.fill(FAR);
+        squares.fill(FAR * FAR);
+        // SAFETY: as the caller's; the margins are as wide as the search is.
+        unsafe {
+            let mut largest = S::splat(0.0);
+            for y in (rows.first..rows.first + rows.count).rev() {
+                let map = rows.map(y).as_mut_ptr();
+                for x in (0..inside).step_by(GROUP) {
+                    let below = below.as_mut_ptr().add(x);
+                    let from_below = S::add(S::load(below), S::splat(1.0));
+                    let distance = S::min(S::load(map.add(x)), from_below);
+                    S::store(below, distance);
+                    let square = S::mul(distance, distance);
+                    S::store(squares.as_mut_ptr().add(margin + x), square);
+                }
+                // No depth change lies behind the row's end.
+                squares[margin + rows.width..].fill(FAR * FAR);
+                let depths = rows.depths(y).as_ptr();
+                for x in (0..inside).step_by(GROUP) {
+                    let depth = S::load(depths.add(x));
+                    let squares = squares.as_ptr().add(margin + x);
+                    let radius = radius::<S>(depth, squares, options);
+                    largest = S::max(radius, largest);
+                    S::store(map.add(x), radius);
+                }
+            }
+            let mut lanes = [0.0; GROUP];
+            S::store(lanes.as_mut_ptr(), largest);
+            lanes.into_iter().fold(0.0, f32::max)
+        }
+    }
+}
+
+/// Compares the pixel behind a gap with the one before it, and marks the gap's last pixel if they are a depth change
+/// apart.
+#[cold]
+fn mark_gap(depths: &[f32], at: usize, options: &PaperOptions, right: &mut [f32]) {
+    if let Some(from) = depths[..at].iter().rposition(|depth| !depth.is_nan()) {
+        let difference = depths[at] - depths[from];
+        let gap = at - from;
+        if crate::paper::smoothing_area::is_depth_change(depths[from], difference, gap, options) {
+            right[at - 1] = f32::from_bits(!0);
+        }
+    }
+}
+
+/// `paper::smoothing_area::smallest_depth_change`
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn smallest_depth_change<S: Simd>(depth: S::F, options: &PaperOptions) -> S::F {
+    // SAFETY: as the caller's.
+    unsafe { S::mul(S::mul(S::splat(options.alpha), depth), depth) }
+}
+
+/// The mask of `paper::smoothing_area::is_depth_change`; false where a depth is NaN.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn is_change<S: Simd>(
+    depth: S::F,
+    neighbour: S::F,
+    gap: S::F,
+    options: &PaperOptions,
+) -> S::F {
+    // SAFETY: as the caller's.
+    unsafe {
+        let least = S::mul(S::splat(options.gamma), smallest_depth_change::<S>(depth, options));
+        let (least, difference) = (S::mul(least, gap), S::abs(S::sub(neighbour, depth)));
+        S::or(S::lt(least, difference), S::eq(least, difference))
+    }
+}
+
+/// `paper::smoothing_area::smoothing_radius`, whole pixels, of eight pixels; `squares` are the squared distances to
+/// the changes of their own columns, as far to both sides as matters.
+///
+/// # Safety
+/// The processor has the instruction set of `S`; `squares` is readable [`reach`] to both sides of the eight.
+#[inline(always)]
+unsafe fn radius<S: Simd>(depth: S::F, squares: *const f32, options: &PaperOptions) -> S::F {
+    // SAFETY: as the caller's.
+    unsafe {
+        let wanted = S::mul(S::splat(options.beta), smallest_depth_change::<S>(depth, options));
+        let least = S::splat(options.least_depth_radius as f32);
+        // A missing depth gives the least radius here.
+        let wanted = S::min(S::max(wanted, least), S::splat(options.largest_radius as f32));
+        let there = S::eq(depth, depth);
+        // Changes farther than this do not matter.
+        let more = S::add(wanted, S::splat(1.0));
+        let enough = S::and(there, S::mul(S::mul(more, more), S::splat(2.0)));
+
+        let mut nearest = S::load(squares);
+        let mut column = 1;
+        loop {
+            let square = S::splat((column * column) as f32);
+            if S::bits(S::lt(square, S::min(nearest, enough))) == 0 {
+                break;
+            }
+            let (left, right) = (S::load(squares.sub(column)), S::load(squares.add(column)));
+            nearest = S::min(nearest, S::add(S::min(left, right), square));
+            column += 1;
+        }
+        let distance = S::sqrt(nearest);
+        let radius = S::min(wanted, S::div(distance, S::splat(std::f32::consts::SQRT_2)));
+        let too_small = S::lt(radius, S::splat(options.smallest_radius as f32));
+        S::and(S::and_not(too_small, there), S::truncate(radius))
+    }
+}

@@ -1,0 +1,57 @@
+//! The outermost functions, each compiled for its instruction set.
+
+use crate::isa::Isa;
+use crate::simd::Simd;
+use crate::simd::portable::Portable;
+#[cfg(target_arch = "x86_64")]
+use crate::simd::x86::{Avx2, Sse2};
+
+/// Work that is compiled for every instruction set; `run` is `#[inline(always)]`.
+pub(super) trait Task {
+    type Output;
+
+    /// # Safety
+    /// The processor has the instruction set of `S`, and what the task asks for.
+    unsafe fn run<S: Simd>(self) -> Self::Output;
+}
+
+macro_rules! path {
+    ($name:ident, $simd:ty $(, $feature:literal)?) => {
+        /// # Safety
+        /// The processor has this instruction set, and what the task asks for.
+        $(#[target_feature(enable = $feature)])?
+        unsafe fn $name<T: Task>(task: T) -> T::Output {
+            // SAFETY: as the caller's.
+            unsafe { task.run::<$simd>() }
+        }
+    };
+}
+
+path!(portable, Portable);
+#[cfg(target_arch = "x86_64")]
+path!(sse2, Sse2);
+#[cfg(target_arch = "x86_64")]
+path!(avx2, Avx2, "avx2");
+#[cfg(target_arch = "x86_64")]
+path!(avx512, Avx2, "avx2,avx512f,avx512vl,avx512dq,avx512bw");
+#[cfg(target_arch = "aarch64")]
+path!(neon, crate::simd::neon::Neon, "neon");
+
+/// # Safety
+/// The processor has the instruction set, and what the task asks for.
+pub(super) unsafe fn run<T: Task>(isa: Isa, task: T) -> T::Output {
+    // SAFETY: as the caller's.
+    unsafe {
+        match isa {
+            #[cfg(target_arch = "x86_64")]
+            Isa::Sse2 => sse2(task),
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx2 => avx2(task),
+            #[cfg(target_arch = "x86_64")]
+            Isa::Avx512 => avx512(task),
+            #[cfg(target_arch = "aarch64")]
+            Isa::Neon => neon(task),
+            _ => portable(task),
+        }
+    }
+}
