@@ -37,7 +37,7 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// Times and what a figure says, or what is wrong with its lines.
+/// A plot and what it says, or what is wrong with its lines.
 type Drawn = Result<(String, String), String>;
 
 /// Fig. 4 from lines "WHO,MILLISECONDS", of which the medians count: the plot, and what it says.
@@ -121,4 +121,13 @@ fn ratio(curves: &Curves, other: &str) -> String {
     let ratios = sdc.iter().zip(other_curve).map(|(sdc, other)| other.1 / sdc.1);
     let (least, most) = ratios.fold((f64::INFINITY, 0f64), |(a, b), r| (a.min(r), b.max(r)));
     format!("\nThe error of {other} is {least:.2} to {most:.2} times that of SDC.\n")
+}
+
+/// What the lines "FRAME,FIXED,ADAPTIVE" of Fig. 9 say, after one with their names.
+pub fn real_frames(lines: &str) -> String {
+    let rows = lines.lines().skip(1).map(|line| format!("| {} |\n", line.replace(',', " | ")));
+    format!(
+        "| frame | fixed windows | adaptive windows |\n|---|---:|---:|\n{}",
+        rows.collect::<String>()
+    )
 }
