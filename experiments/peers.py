@@ -5,13 +5,11 @@ Writes NAME.PEER.normals beside each NAME.cloud, and prints "skipped: PEER" for 
 
 import sys
 
-import numpy
-
 try:
     import cv2
+    import numpy
 except ImportError:
-    cv2 = None
-    print("skipped: OpenCV")
+    sys.exit(print("skipped: OpenCV\nskipped: D2NT"))  # which needs both
 try:
     import d2nt
 except ImportError:
@@ -56,9 +54,7 @@ def from_d2nt(points, camera, version):
 
 for path in sys.argv[1:]:
     points, camera = read(path)
-    peers = []
-    if cv2:
-        peers += [(name, opencv, arguments) for name, *arguments in OPENCV]
+    peers = [(name, opencv, arguments) for name, *arguments in OPENCV]
     if d2nt:
         peers += [(name, from_d2nt, arguments) for name, *arguments in D2NT]
     for name, function, arguments in peers:

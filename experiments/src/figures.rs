@@ -32,29 +32,25 @@ fn curves(values: impl Iterator<Item = (String, f64)>) -> Result<Curves, String>
     Ok(curves)
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
 /// A plot and what it says, or what is wrong with its lines.
 type Drawn = Result<(String, String), String>;
 
-/// Fig. 4 from lines "WHO,MILLISECONDS", of which the medians count: the plot, and what it says.
+/// Fig. 4 from lines "WHO,MILLISECONDS", of which the least count: the plot, and what it says.
 pub fn times(lines: &str) -> Drawn {
-    let mut all: Vec<(String, Vec<f64>)> = Vec::new();
+    let mut all: Vec<(String, f64)> = Vec::new();
     for line in lines.lines() {
         let (who, time) = line.split_once(',').ok_or(format!("not a time: {line}"))?;
         let time: f64 = time.parse().map_err(|_| format!("not a time: {line}"))?;
         match all.iter_mut().find(|(known, _)| known == who) {
-            Some((_, times)) => times.push(time),
-            None => all.push((who.to_owned(), vec![time])),
+            Some((_, least)) => *least = least.min(time),
+            None => all.push((who.to_owned(), time)),
         }
     }
-    let curves = curves(all.into_iter().map(|(who, times)| (who, median(times))))?;
-    let mut text = "| ms, one thread | smallest window | largest window | slowest over fastest |\n\
+    let curves = curves(all.into_iter())?;
+    let mut text =
+        "| least ms, one thread | smallest window | largest window | slowest over fastest |\n\
                     |---|---:|---:|---:|\n"
-        .to_owned();
+            .to_owned();
     for (name, curve) in &curves {
         let (first, last) = (curve[0], curve[curve.len() - 1]);
         let slowest = curve.iter().map(|point| point.1).fold(0.0, f64::max);
@@ -73,19 +69,19 @@ pub fn times(lines: &str) -> Drawn {
     Ok((svg(&[panel], 1), text))
 }
 
-/// Fig. 5 (noise "0") or Fig. 8 (all others) from scores: a column of plots for every noise, the upper one of the
-/// whole image and the lower one away from depth edges and creases; and what they say.
+/// Fig. 5 (noise "0") or Fig. 8 (all others) from scores: a column of plots for every noise, one of the whole image, of
+/// what is near depth edges, and of what is near nothing; and what they say.
 pub fn errors(rows: &[Row], noises: &[&str]) -> Drawn {
     let mut panels = Vec::new();
     let mut text = String::new();
-    for (band, place) in [("all", "whole image"), ("elsewhere", "away from edges and creases")] {
+    for band in ["all", "depth edges", "elsewhere"] {
         for noise in noises {
             let rows: Vec<&Row> =
                 rows.iter().filter(|r| r.noise == *noise && r.band == band).collect();
             let curves = curves(rows.iter().map(|row| (row.who.clone(), row.mean)))?;
             let title = match *noise {
-                "0" => format!("No noise, {place}"),
-                sigma => format!("Noise in z of {sigma} m, {place}"),
+                "0" => format!("No noise: {band}"),
+                sigma => format!("Noise in z of {sigma} m: {band}"),
             };
             text += &table(&title, &curves, &rows);
             let y = Axis { label: "mean error in degrees", scale: Scale::Linear };
@@ -100,7 +96,7 @@ fn table(title: &str, curves: &Curves, rows: &[&Row]) -> String {
     let Some((_, first)) = curves.first() else { return String::new() };
     let heads: Vec<String> = first.iter().map(|(points, _)| format!("{points} points")).collect();
     let mut text =
-        format!("\n{title}: mean error in degrees\n\n| | {} | cover % |\n", heads.join(" | "));
+        format!("\n{title}; mean error in degrees\n\n| | {} | cover % |\n", heads.join(" | "));
     text += &format!("|---|{}\n", "---:|".repeat(heads.len() + 1));
     for (name, curve) in curves {
         let errors: Vec<String> = curve.iter().map(|(_, error)| format!("{error:.2}")).collect();

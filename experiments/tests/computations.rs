@@ -112,9 +112,9 @@ fn a_mode_leads_only_over_peers_that_cover_no_more() {
 }
 
 #[test]
-fn figures_show_medians_over_the_number_of_points() {
+fn figures_show_least_times_and_mean_errors_over_the_number_of_points() {
     let times =
-        "iine SDC-5,9\nPCL-kNN-25,40\niine SDC-5,2\niine SDC-5,1\niine SDC-7,2\nPCL-kNN-49,80\n";
+        "iine SDC-5,9\nPCL-kNN-25,40\niine SDC-5,2\niine SDC-5,3\niine SDC-7,2\nPCL-kNN-49,80\n";
     let (plot, text) = figures::times(times).expect("times");
     assert!(text.contains("| iine SDC | 2.0 (25 points) | 2.0 (49 points) | 1.0 |"), "{text}");
     assert!(text.contains("| PCL-kNN | 40.0 (25 points) | 80.0 (49 points) | 2.0 |"), "{text}");

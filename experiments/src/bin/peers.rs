@@ -75,17 +75,12 @@ fn clouds(name: &str, folder: &Path) -> Result<(), String> {
 fn scores(name: &str, folder: &Path) -> Result<(), String> {
     let (exact, frames) = frames(name)?;
     let distances = Distances::of(&exact);
-    let scored = parallel::map(frames, |noisy| {
-        let found = scores_of(&noisy, &distances, folder)?;
-        Ok::<_, String>((noisy.noise, found))
-    });
     let mut sums: Vec<(&str, String, [Score; 3])> = Vec::new();
-    for frame in scored {
-        let (noise, found) = frame?;
-        for (who, scores) in found {
-            match sums.iter_mut().find(|(n, w, _)| *n == noise && *w == who) {
+    for noisy in &frames {
+        for (who, scores) in scores_of(noisy, &distances, folder)? {
+            match sums.iter_mut().find(|(noise, w, _)| *noise == noisy.noise && *w == who) {
                 Some((.., sum)) => sum.iter_mut().zip(&scores).for_each(|(a, b)| a.add(b)),
-                None => sums.push((noise, who, scores)),
+                None => sums.push((noisy.noise, who, scores)),
             }
         }
     }
@@ -103,11 +98,11 @@ fn scores_of(
 ) -> Result<Vec<(String, [Score; 3])>, String> {
     let frame = &noisy.frame;
     let score = |normals: &[[f32; 3]]| by_band(frame, distances, normals, 0..normals.len());
-    let mut found = Vec::new();
-    for mode in Mode::all() {
+    let ours = parallel::map(Mode::all(), |mode| {
         let normals = mode.normals(&frame.points, frame.width()).map_err(|e| e.to_string())?;
-        found.push((format!("{OURS}{}", mode.name), score(&normals)));
-    }
+        Ok((format!("{OURS}{}", mode.name), score(&normals)))
+    });
+    let mut found = ours.into_iter().collect::<Result<Vec<_>, String>>()?;
     for (who, path) in peers_of(folder, &noisy.file)? {
         let mut normals = exchange::read_normals(&path, frame.points.len())
             .map_err(|e| format!("{}: {e}", path.display()))?;
