@@ -239,6 +239,16 @@ impl<'a> Points<'a> {
         }
     }
 
+    /// The 16 bytes from a point's x, as floats.
+    ///
+    /// # Safety
+    /// As [`Points::at_unchecked`]; the points are whole ([`Points::has_whole_points`]), and this is not the last.
+    #[inline(always)]
+    pub(crate) unsafe fn whole_at_unchecked(&self, x: usize, y: usize) -> [f32; 4] {
+        // SAFETY: promised by the caller.
+        unsafe { self.x.byte_add(self.grid.offset(x, y)).cast::<[f32; 4]>().read_unaligned() }
+    }
+
     /// The depth at column `x`, row `y`.
     ///
     /// # Panics

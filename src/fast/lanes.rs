@@ -141,7 +141,12 @@ impl LaneOrder {
 /// `from` is valid for reads, `to` for writes of four floats at each of four rows.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
-unsafe fn transpose4(from: *const f32, from_stride: usize, to: *mut f32, to_stride: usize) {
+pub(crate) unsafe fn transpose4(
+    from: *const f32,
+    from_stride: usize,
+    to: *mut f32,
+    to_stride: usize,
+) {
     use std::arch::x86_64::*;
     // SAFETY: promised by the caller; SSE is part of every x86-64.
     unsafe {
@@ -161,7 +166,12 @@ unsafe fn transpose4(from: *const f32, from_stride: usize, to: *mut f32, to_stri
 /// `from` is valid for reads, `to` for writes of four floats at each of four rows.
 #[cfg(not(target_arch = "x86_64"))]
 #[inline(always)]
-unsafe fn transpose4(from: *const f32, from_stride: usize, to: *mut f32, to_stride: usize) {
+pub(crate) unsafe fn transpose4(
+    from: *const f32,
+    from_stride: usize,
+    to: *mut f32,
+    to_stride: usize,
+) {
     for row in 0..4 {
         for column in 0..4 {
             // SAFETY: promised by the caller.

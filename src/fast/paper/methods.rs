@@ -2,32 +2,50 @@
 //! in `paper::methods`.
 
 use super::integrals::{Channels, Counted};
+use super::rects::Rects;
 use crate::fast::arithmetic::{Doubles, Floats, cross, dot};
+use crate::fast::lanes::transpose4;
 use crate::fast::moments::{WindowMoments, plane};
 use crate::fast::tile::Found;
-use crate::paper::{CleanPoints, Rect};
 use crate::simd::{GROUP, Simd};
 
-/// A method's sums and normals, `N` channels and `M` numbers per window that its normal is made from.
-pub(crate) trait Sums<const N: usize, const M: usize>: Channels<N> {
+/// A method's sums and normals.
+pub(crate) trait Sums<const N: usize>: Channels<N> {
+    /// What eight windows' normals are made from.
+    type Numbers: Default;
+
     /// Whether the method gives a curvature.
     const CURVATURE: bool;
 
-    /// What is summed over of a window.
-    fn summed(rect: &Rect) -> Rect;
+    /// Whether the window's outermost rows and columns are not summed over.
+    const INNER: bool;
 
-    /// The numbers; none if that is left to the plain form.
-    fn numbers(&self, sum: [f64; N], rect: &Rect, points: &impl CleanPoints) -> Option<[f64; M]>;
+    /// Whether the ends of the window's middle row and column are wanted.
+    const ENDS: bool;
+
+    /// Takes the sum of one window; `points` and `ends` are there if wanted.
+    fn take(
+        numbers: &mut Self::Numbers,
+        lane: usize,
+        sum: [f64; N],
+        rects: &Rects,
+        points: &[Counted],
+    );
 
     /// What the rounding errors of sums stay below, where the points have been summed to `total` over `count` pixels
     /// and no coordinate is above `largest`.
-    fn error(&self, total: [f64; N], count: usize, largest: f32) -> f64;
+    fn error(total: [f64; N], count: usize, largest: f32) -> f64;
 
     /// The normals.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
-    unsafe fn normals<S: Simd>(numbers: &[[f64; GROUP]; M], error: f64, lanes: u32) -> Found<S>;
+    unsafe fn normals<S: Simd>(
+        numbers: &Self::Numbers,
+        rects: &Rects,
+        error: f64,
+        lanes: u32,
+    ) -> Found<S>;
 }
 
 /// A few units in the last place of a double.
@@ -38,7 +56,7 @@ pub(crate) struct CovarianceMatrix {
     pub origin: [f32; 3],
 }
 
-/// Number of points, first and second moments.
+/// First moments and the number of points, second moments.
 pub(crate) const MOMENTS: usize = 10;
 
 impl Channels<MOMENTS> for CovarianceMatrix {
@@ -54,43 +72,44 @@ impl Channels<MOMENTS> for CovarianceMatrix {
     }
 }
 
-impl Sums<MOMENTS, MOMENTS> for CovarianceMatrix {
+impl Sums<MOMENTS> for CovarianceMatrix {
+    type Numbers = [[f64; GROUP]; MOMENTS];
     const CURVATURE: bool = true;
+    const INNER: bool = false;
+    const ENDS: bool = false;
 
     #[inline(always)]
-    fn summed(rect: &Rect) -> Rect {
-        rect.clone()
-    }
-
-    #[inline(always)]
-    fn numbers(
-        &self,
+    fn take(
+        numbers: &mut Self::Numbers,
+        lane: usize,
         sum: [f64; MOMENTS],
-        _: &Rect,
-        _: &impl CleanPoints,
-    ) -> Option<[f64; MOMENTS]> {
-        Some(sum)
+        _: &Rects,
+        _: &[Counted],
+    ) {
+        for i in 0..MOMENTS {
+            numbers[i][lane] = sum[i];
+        }
     }
 
-    fn error(&self, total: [f64; MOMENTS], _: usize, _: f32) -> f64 {
+    fn error(total: [f64; MOMENTS], _: usize, _: f32) -> f64 {
         ROUNDING * (total[4] + total[7] + total[9])
     }
 
     #[inline(always)]
     unsafe fn normals<S: Simd>(
-        numbers: &[[f64; GROUP]; MOMENTS],
+        numbers: &Self::Numbers,
+        _: &Rects,
         error: f64,
         lanes: u32,
     ) -> Found<S> {
         // SAFETY: as the caller's; each number is there for a whole group.
         unsafe {
-            let number = |i: usize| Doubles::<S>(S::load_d(numbers[i].as_ptr()));
-            let count = number(3);
-            let first = [number(0), number(1), number(2)];
-            let second = [number(4), number(5), number(6), number(7), number(8), number(9)];
-            let [x, y, z] = first;
-            let [xx, xy, xz, yy, yz, zz] = second;
-            plane(&WindowMoments { sums: [x, y, z, xx, xy, xz, yy, yz, zz], count }, error, lanes)
+            let mut sums = [Doubles::<S>::splat(0.0); 9];
+            for (c, i) in [0, 1, 2, 4, 5, 6, 7, 8, 9].into_iter().enumerate() {
+                sums[c] = Doubles(S::load_d(numbers[i].as_ptr()));
+            }
+            let count = Doubles(S::load_d(numbers[3].as_ptr()));
+            plane(&WindowMoments { sums, count }, error, lanes)
         }
     }
 }
@@ -106,6 +125,31 @@ fn difference([before, after]: [&Counted; 2]) -> [f32; 4] {
     difference
 }
 
+/// What the error of sums of differences stays below.
+fn error_of_differences(count: usize, largest: f32) -> f64 {
+    2.0 * ROUNDING * f64::from(largest) * count as f64
+}
+
+/// Four numbers of eight windows, window by window.
+type Fours = [[f32; 4]; GROUP];
+
+/// The same number by number.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+pub(crate) unsafe fn by_number<S: Simd>(fours: &Fours) -> [Floats<S>; 4] {
+    let mut lanes = [[0.0; GROUP]; 4];
+    // SAFETY: as the caller's; four windows' numbers are four times four floats.
+    unsafe {
+        let from = fours.as_ptr().cast::<f32>();
+        transpose4(from, 4, lanes.as_mut_ptr().cast(), GROUP);
+        transpose4(from.add(16), 4, lanes.as_mut_ptr().cast::<f32>().add(4), GROUP);
+        let load = |i: usize| Floats(S::load(lanes[i].as_ptr()));
+        [load(0), load(1), load(2), load(3)]
+    }
+}
+
 /// The 3-D gradients.
 pub(crate) struct Gradients;
 
@@ -117,28 +161,33 @@ impl Channels<8> for Gradients {
     }
 }
 
-impl Sums<8, 6> for Gradients {
+impl Sums<8> for Gradients {
+    /// Horizontal and vertical gradients.
+    type Numbers = [Fours; 2];
     const CURVATURE: bool = false;
+    const INNER: bool = true;
+    const ENDS: bool = false;
 
     #[inline(always)]
-    fn summed(rect: &Rect) -> Rect {
-        rect.inner()
+    fn take(numbers: &mut [Fours; 2], lane: usize, sum: [f64; 8], _: &Rects, _: &[Counted]) {
+        for i in 0..4 {
+            numbers[0][lane][i] = sum[i] as f32;
+            numbers[1][lane][i] = sum[i + 4] as f32;
+        }
+    }
+
+    fn error(_: [f64; 8], count: usize, largest: f32) -> f64 {
+        error_of_differences(count, largest)
     }
 
     #[inline(always)]
-    fn numbers(&self, sum: [f64; 8], _: &Rect, _: &impl CleanPoints) -> Option<[f64; 6]> {
-        let [a, b, c, _, e, f, g, _] = sum;
-        Some([a, b, c, e, f, g])
-    }
-
-    fn error(&self, _: [f64; 8], count: usize, largest: f32) -> f64 {
-        ROUNDING * 2.0 * f64::from(largest) * count as f64
-    }
-
-    #[inline(always)]
-    unsafe fn normals<S: Simd>(numbers: &[[f64; GROUP]; 6], error: f64, _: u32) -> Found<S> {
+    unsafe fn normals<S: Simd>(numbers: &[Fours; 2], _: &Rects, error: f64, _: u32) -> Found<S> {
         // SAFETY: as the caller's.
-        unsafe { across(numbers, error) }
+        unsafe {
+            let [hx, hy, hz, _] = by_number::<S>(&numbers[0]);
+            let [vx, vy, vz, _] = by_number::<S>(&numbers[1]);
+            across([hx, hy, hz], [vx, vy, vz], error)
+        }
     }
 }
 
@@ -147,50 +196,61 @@ pub(crate) struct SmoothedDepthChanges;
 
 impl Channels<4> for SmoothedDepthChanges {
     #[inline(always)]
-    fn of(&self, _: &Counted, row: [&Counted; 2], column: [&Counted; 2]) -> [f64; 4] {
-        let depth_change = |[before, after]: [&Counted; 2]| {
-            let both = before[3] * after[3];
-            ((after[2] - before[2]) * both, both)
-        };
-        let ((a, b), (c, d)) = (depth_change(row), depth_change(column));
-        [a, b, c, d].map(f64::from)
+    fn of(&self, _: &Counted, [left, right]: [&Counted; 2], [up, down]: [&Counted; 2]) -> [f64; 4] {
+        let (row, column) = (left[3] * right[3], up[3] * down[3]);
+        [(right[2] - left[2]) * row, row, (down[2] - up[2]) * column, column].map(f64::from)
     }
 }
 
-impl Sums<4, 6> for SmoothedDepthChanges {
+impl Sums<4> for SmoothedDepthChanges {
+    /// Depth changes and their counts, the differences of the ends of the middle row, and of the middle column with,
+    /// instead of z, how far the ends are apart.
+    type Numbers = [Fours; 3];
     const CURVATURE: bool = false;
+    const INNER: bool = true;
+    const ENDS: bool = true;
 
     #[inline(always)]
-    fn summed(rect: &Rect) -> Rect {
-        rect.inner()
-    }
-
-    /// The tangents times twice the number of differences.
-    #[inline(always)]
-    fn numbers(&self, sum: [f64; 4], rect: &Rect, points: &impl CleanPoints) -> Option<[f64; 6]> {
-        let (column, row) = rect.middle();
-        let tangent = |from: [f32; 3], to: [f32; 3], length: usize, sum: f64, count: f64| {
-            let difference = |c: usize| (f64::from(to[c]) - f64::from(from[c])) * (2.0 * count);
-            [difference(0), difference(1), sum * length as f64]
-        };
-        let (left, right) = (points.at(rect.x.start, row), points.at(rect.x.end - 1, row));
-        let (upper, lower) = (points.at(column, rect.y.start), points.at(column, rect.y.end - 1));
-        if (left[2] + right[2] + upper[2] + lower[2]).is_nan() {
-            return None;
+    fn take(
+        numbers: &mut [Fours; 3],
+        lane: usize,
+        sum: [f64; 4],
+        rects: &Rects,
+        points: &[Counted],
+    ) {
+        for i in 0..4 {
+            numbers[0][lane][i] = sum[i] as f32;
         }
-        let [a, b, c] = tangent(left, right, rect.x.len() - 1, sum[0], sum[1]);
-        let [d, e, f] = tangent(upper, lower, rect.y.len() - 1, sum[2], sum[3]);
-        Some([a, b, c, d, e, f])
+        for (line, to) in (0..2).zip(&mut numbers[1..]) {
+            let [from, end] = rects.ends[line];
+            let (a, b) = (&points[from[lane] as usize], &points[end[lane] as usize]);
+            let both = a[3] * b[3];
+            to[lane] = [b[0] - a[0], b[1] - a[1], rects.spans[line][lane], both];
+            if both == 0.0 {
+                to[lane] = rects.outermost(line, lane, points);
+            }
+        }
     }
 
-    fn error(&self, _: [f64; 4], count: usize, largest: f32) -> f64 {
-        ROUNDING * 2.0 * f64::from(largest) * count as f64
+    fn error(_: [f64; 4], count: usize, largest: f32) -> f64 {
+        error_of_differences(count, largest)
     }
 
     #[inline(always)]
-    unsafe fn normals<S: Simd>(numbers: &[[f64; GROUP]; 6], error: f64, _: u32) -> Found<S> {
+    unsafe fn normals<S: Simd>(numbers: &[Fours; 3], _: &Rects, error: f64, _: u32) -> Found<S> {
         // SAFETY: as the caller's.
-        unsafe { across(numbers, error) }
+        unsafe {
+            let [h, h_count, v, v_count] = by_number::<S>(&numbers[0]);
+            let [hx, hy, h_span, _] = by_number::<S>(&numbers[1]);
+            let [vx, vy, v_span, _] = by_number::<S>(&numbers[2]);
+            // Times twice the number of depth changes, which are over two pixels each.
+            let (h_count, v_count) = (h_count + h_count, v_count + v_count);
+            across(
+                [hx * h_count, hy * h_count, h * h_span],
+                [vx * v_count, vy * v_count, v * v_span],
+                error,
+            )
+        }
     }
 }
 
@@ -205,11 +265,9 @@ const DOUBT_SINE: f32 = 1e-4;
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn across<S: Simd>(numbers: &[[f64; GROUP]; 6], error: f64) -> Found<S> {
-    // SAFETY: as the caller's; each number is there for a whole group.
+unsafe fn across<S: Simd>(h: [Floats<S>; 3], v: [Floats<S>; 3], error: f64) -> Found<S> {
+    // SAFETY: as the caller's.
     unsafe {
-        let number = |i: usize| Doubles::<S>(S::load_d(numbers[i].as_ptr())).narrow();
-        let (h, v) = ([number(0), number(1), number(2)], [number(3), number(4), number(5)]);
         let n = cross(v, h);
         let (n2, h2, v2) = (dot(n, n), dot(h, h), dot(v, v));
         let error = (error * DOUBT_SUMS) as f32;

@@ -4,26 +4,33 @@
 mod depths;
 mod integrals;
 mod methods;
+mod rects;
 mod tile;
 mod windows;
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use depths::row_length;
-use integrals::Integrals;
+use integrals::{Rings, rows_of_rings};
 use methods::{CovarianceMatrix, Gradients, MOMENTS, SmoothedDepthChanges};
 use tile::Tile;
 use windows::{Rows, Sweep, reach};
 
 use super::paths::{self, Task};
 use super::sink::Sink;
-use super::{Chunk, Parts, TILE_BYTES, TILE_ROWS, lock, reserve, share_out};
+use super::{Chunk, Parts, lock, reserve, share_out};
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::options::{DistanceMetric, Method, Options};
 use crate::paper::PaperMaps;
 use crate::simd::{GROUP, Simd};
+
+/// Rows of a tile: those around it that its windows reach are read again for the next one.
+const TILE_ROWS: usize = 256;
+
+/// Bytes of a tile's rings, to stay in the second-level cache.
+const TILE_BYTES: usize = 512 << 10;
 
 /// Rows of the whole image: depths, and the radii of windows.
 #[derive(Debug, Default)]
@@ -44,9 +51,9 @@ impl Scratch {
 pub(crate) struct WorkerScratch {
     planes: Vec<f32>,
     sweep: Sweep,
-    moments: Integrals<MOMENTS>,
-    gradients: Integrals<8>,
-    depth_changes: Integrals<4>,
+    moments: Rings<MOMENTS>,
+    gradients: Rings<8>,
+    depth_changes: Rings<4>,
 }
 
 impl WorkerScratch {
@@ -130,14 +137,15 @@ pub(crate) fn compute(
         let at = (chunk.start + y - chunk.swept.start) * length;
         (&depths[y * length..][..length], &radii[at..at + length])
     };
-    let ring = (2 * largest + 2).next_power_of_two();
-    let columns = TILE_BYTES / (channels(options.method) * size_of::<f64>() * ring);
+    let columns = TILE_BYTES / (column(options.method) * rows_of_rings(largest));
     let columns = columns.max(4 * largest).next_multiple_of(GROUP);
     let across = width.div_ceil(columns);
     // Tiles of like widths.
     let columns = width.div_ceil(across).next_multiple_of(GROUP);
-    workers.for_each(across * height.div_ceil(TILE_ROWS), |worker, item| {
-        let (first, column) = (item / across * TILE_ROWS, item % across * columns);
+    let down = height.div_ceil(TILE_ROWS);
+    let rows = height.div_ceil(down);
+    workers.for_each(across * down, |worker, item| {
+        let (first, column) = (item / across * rows, item % across * columns);
         if column >= width {
             return;
         }
@@ -145,7 +153,8 @@ pub(crate) fn compute(
             points,
             options,
             columns: column..(column + columns).min(width),
-            rows: first..(first + TILE_ROWS).min(height),
+            rows: first..(first + rows).min(height),
+            whole_points,
             largest,
             row,
         };
@@ -156,12 +165,12 @@ pub(crate) fn compute(
     Ok(())
 }
 
-/// How many channels a method sums.
-fn channels(method: Method) -> usize {
+/// Bytes that a column takes in a row of a method's rings.
+fn column(method: Method) -> usize {
     match method {
-        Method::CovarianceMatrix => MOMENTS,
-        Method::AverageDepthChange => 4,
-        Method::Average3DGradient | Method::Simple3DGradient => 8,
+        Method::CovarianceMatrix => Rings::<MOMENTS>::COLUMN,
+        Method::AverageDepthChange => Rings::<4>::COLUMN,
+        Method::Average3DGradient | Method::Simple3DGradient => Rings::<8>::COLUMN,
     }
 }
 
@@ -221,15 +230,15 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Task for TileTask<'a, '_, F> {
             match tile.options.method {
                 Method::CovarianceMatrix => {
                     let method = CovarianceMatrix { origin: tile.origin() };
-                    tile.compute::<S, _, MOMENTS, MOMENTS>(&method, &mut scratch.moments, sink);
+                    tile.compute::<S, _, MOMENTS>(&method, &mut scratch.moments, sink);
                 }
                 Method::AverageDepthChange => {
                     let integrals = &mut scratch.depth_changes;
-                    tile.compute::<S, _, 4, 6>(&SmoothedDepthChanges, integrals, sink);
+                    tile.compute::<S, _, 4>(&SmoothedDepthChanges, integrals, sink);
                 }
                 // The paper has no SIMPLE_3D_GRADIENT; the options' check refuses it.
                 Method::Average3DGradient | Method::Simple3DGradient => {
-                    tile.compute::<S, _, 8, 6>(&Gradients, &mut scratch.gradients, sink);
+                    tile.compute::<S, _, 8>(&Gradients, &mut scratch.gradients, sink);
                 }
             }
         }

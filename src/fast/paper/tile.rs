@@ -3,10 +3,10 @@
 
 use std::ops::Range;
 
-use super::integrals::Integrals;
-use super::methods::Sums;
+use super::integrals::Rings;
+use super::methods::{Sums, by_number};
+use super::rects::{Place, Rects};
 use crate::cloud::Points;
-use crate::fast::arithmetic::Floats;
 use crate::fast::sink::Sink;
 use crate::fast::tile::{Bits, Octet};
 use crate::methods::Estimate;
@@ -21,6 +21,7 @@ pub(crate) struct Tile<'a, F> {
     pub options: &'a Options,
     pub columns: Range<usize>,
     pub rows: Range<usize>,
+    pub whole_points: bool,
     /// The largest radius in the frame.
     pub largest: usize,
     /// A row's depths and the radii of its windows.
@@ -31,10 +32,10 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
     /// # Safety
     /// The processor has the instruction set of `S`; no one else writes the tile's pixels.
     #[inline(always)]
-    pub unsafe fn compute<S: Simd, M: Sums<N, K>, const N: usize, const K: usize>(
+    pub unsafe fn compute<S: Simd, M: Sums<N>, const N: usize>(
         &self,
         method: &M,
-        integrals: &mut Integrals<N>,
+        rings: &mut Rings<N>,
         sink: &Sink,
     ) {
         let (width, height) = (self.points.width(), self.points.height());
@@ -44,22 +45,25 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let (top, bottom) =
             (self.rows.start.saturating_sub(reach), (self.rows.end + reach).min(height));
         let count = columns.len() * (bottom - top);
-        integrals.start(columns, top, 2 * reach + 1);
-        integrals.read(self.points, (self.row)(top).0, top);
+        rings.start(columns, top, reach);
+        // SAFETY: as the caller's.
+        unsafe { rings.read::<S>(self.points, (self.row)(top).0, top, self.whole_points) };
         let mut next = top;
         for y in self.rows.clone() {
             while next < (y + reach + 1).min(bottom) {
                 if next + 1 < height {
-                    integrals.read(self.points, (self.row)(next + 1).0, next + 1);
+                    let depths = (self.row)(next + 1).0;
+                    // SAFETY: as the caller's.
+                    unsafe { rings.read::<S>(self.points, depths, next + 1, self.whole_points) };
                 } else {
-                    integrals.read_none(next + 1);
+                    rings.read_none(next + 1);
                 }
-                integrals.push(method, next);
+                rings.push(method, next);
                 next += 1;
             }
-            let error = method.error(integrals.total(next - 1), count, integrals.largest());
+            let error = M::error(rings.total(next - 1), count, rings.largest());
             // SAFETY: as the caller's.
-            unsafe { self.row::<S, M, N, K>(integrals, method, sink, y, error) };
+            unsafe { self.row::<S, M, N>(rings, sink, y, error) };
         }
     }
 
@@ -77,62 +81,49 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn row<S: Simd, M: Sums<N, K>, const N: usize, const K: usize>(
+    unsafe fn row<S: Simd, M: Sums<N>, const N: usize>(
         &self,
-        integrals: &Integrals<N>,
-        method: &M,
+        rings: &Rings<N>,
         sink: &Sink,
         y: usize,
         error: f64,
     ) {
-        let (width, height) = (self.points.width(), self.points.height());
-        let points = Cleaned { points: self.points, zero_is_missing: self.options.zero_is_missing };
+        let image = [self.points.width(), self.points.height()];
+        let (left, stride, rows) = (rings.left(), rings.stride(), rings.rows);
+        let (points, sums) = rings.parts();
         let radii = (self.row)(y).1;
         for x in self.columns.clone().step_by(GROUP) {
             let count = (self.columns.end - x).min(GROUP);
-            // SAFETY: as the caller's; a row of radii is readable up to a whole group.
+            // SAFETY: as the caller's; a row of radii is readable up to a whole group, and the rings hold what the
+            // windows of the tile's pixels need.
             unsafe {
-                let row = S::load(radii.as_ptr().add(x));
-                let windows = S::bits(S::lt(S::splat(0.0), row)) & ((1 << count) - 1);
+                let of_row = S::load(radii.as_ptr().add(x));
+                let windows = S::bits(S::lt(S::splat(0.0), of_row)) & ((1 << count) - 1);
                 if windows == 0 {
                     sink.write_none(x, y, count);
                     continue;
                 }
-                let mut numbers = [[0.0; GROUP]; K];
-                let mut here = [[0.0; GROUP]; 3];
-                let mut plain = 0;
+                let place = Place { image, x, y, left, stride, rows };
+                let rects = Rects::new::<S>(&place, of_row, M::INNER, M::ENDS);
+                let mut numbers = M::Numbers::default();
                 for lane in Bits(windows) {
-                    let radius = radii[x + lane].to_int_unchecked::<i32>() as usize;
-                    let rect = window((x + lane, y), radius, width, height);
-                    let summed = M::summed(&rect);
-                    let sum = integrals.sum(summed.x, summed.y);
-                    let point = self.points.at_unchecked(x + lane, y);
-                    for c in 0..3 {
-                        here[c][lane] = point[c];
+                    let [a, b, c, d] =
+                        rects.corners.each_ref().map(|i| sums.get_unchecked(i[lane] as usize));
+                    let mut sum = [0.0; N];
+                    for i in 0..N {
+                        sum[i] = (d[i] - c[i]) - (b[i] - a[i]);
                     }
-                    match method.numbers(sum, &rect, &points) {
-                        Some(of_window) => {
-                            for i in 0..K {
-                                numbers[i][lane] = of_window[i];
-                            }
-                        }
-                        None => plain |= 1 << lane,
-                    }
+                    M::take(&mut numbers, lane, sum, &rects, points);
                 }
-                let found = M::normals::<S>(&numbers, error, windows & !plain);
-                let plain = (plain | found.doubtful) & windows;
-                let here = [
-                    Floats(S::load(here[0].as_ptr())),
-                    Floats(S::load(here[1].as_ptr())),
-                    Floats(S::load(here[2].as_ptr())),
-                ];
-                let sure = windows & !plain;
+                let found = M::normals::<S>(&numbers, &rects, error, windows);
+                let plain = found.doubtful & windows;
+                let [px, py, pz, _] = by_number::<S>(rings.eight(x, y));
                 let viewpoint = self.options.viewpoint;
+                let (sure, here) = (windows & !plain, [px, py, pz]);
                 let mut normals =
                     Octet::of::<S>(found.normal, found.curvature, here, viewpoint, sure);
                 for lane in Bits(plain) {
-                    let radius = radii[x + lane] as usize;
-                    normals.put(lane, self.plain(&points, (x + lane, y), radius));
+                    normals.put(lane, self.plain((x + lane, y), radii[x + lane] as usize));
                 }
                 sink.write(x, y, count, &normals, M::CURVATURE);
             }
@@ -141,9 +132,10 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
 
     /// The plain form of one pixel.
     #[cold]
-    fn plain(&self, points: &Cleaned, (x, y): (usize, usize), radius: usize) -> Estimate {
+    fn plain(&self, (x, y): (usize, usize), radius: usize) -> Estimate {
+        let points = Cleaned { points: self.points, zero_is_missing: self.options.zero_is_missing };
         let rect = window((x, y), radius, self.points.width(), self.points.height());
-        let found = plain_estimate(self.options.method, points, &rect);
+        let found = plain_estimate(self.options.method, &points, &rect);
         let normal = turn_to_viewpoint(found.normal, points.at(x, y), self.options.viewpoint);
         Estimate { normal, ..found }
     }

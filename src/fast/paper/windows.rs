@@ -13,6 +13,9 @@ use crate::simd::{GROUP, Simd};
 /// More than any distance that matters; its square still fits a float exactly enough to stay the larger.
 const FAR: f32 = 1e6;
 
+/// Columns that are looked at before it is asked whether to go on.
+const AT_ONCE: usize = 4;
+
 /// How far, in pixels, a depth change can be that decides a window.
 pub(crate) fn reach(options: &PaperOptions) -> usize {
     (f64::from(options.largest_radius + 1) * std::f64::consts::SQRT_2) as usize + 2
@@ -30,6 +33,8 @@ pub(crate) struct Sweep {
     below: Vec<f32>,
     /// Squares of them, with room before and after.
     squares: Vec<f32>,
+    /// The square of every distance along a row, from 1 on, in a whole group.
+    along: Vec<[f32; GROUP]>,
 }
 
 /// The rows that are swept: the depths of the whole image, and the map's rows from the first one on.
@@ -63,8 +68,10 @@ impl Rows<'_> {
 impl Sweep {
     /// Bytes held.
     pub fn size(&self) -> usize {
-        let Sweep { last, gap, right, below, squares } = self;
-        [last, gap, right, below, squares].iter().map(|b| b.capacity() * size_of::<f32>()).sum()
+        let Sweep { last, gap, right, below, squares, along } = self;
+        let rows = [last, gap, right, below, squares];
+        let rows = rows.iter().map(|row| row.capacity() * size_of::<f32>()).sum::<usize>();
+        rows + along.capacity() * size_of::<[f32; GROUP]>()
     }
 
     /// Fills the map with the windows' radii, whole numbers of pixels, 0 for none. Returns the largest.
@@ -74,7 +81,9 @@ impl Sweep {
     #[inline(always)]
     pub unsafe fn radii<S: Simd>(&mut self, rows: &mut Rows, options: &PaperOptions) -> f32 {
         let length = row_length(rows.width);
-        let margin = reach(options).next_multiple_of(GROUP);
+        let margin = (reach(options) + AT_ONCE).next_multiple_of(GROUP);
+        self.along.clear();
+        self.along.extend((1..=margin).map(|distance| [(distance * distance) as f32; GROUP]));
         for buffer in [&mut self.last, &mut self.gap, &mut self.right, &mut self.below] {
             grow(buffer, length);
         }
@@ -199,7 +208,7 @@ impl Sweep {
                 for x in (0..inside).step_by(GROUP) {
                     let depth = S::load(depths.add(x));
                     let squares = squares.as_ptr().add(margin + x);
-                    let radius = radius::<S>(depth, squares, options);
+                    let radius = radius::<S>(depth, squares, &self.along, options);
                     largest = S::max(radius, largest);
                     S::store(map.add(x), radius);
                 }
@@ -259,7 +268,12 @@ unsafe fn is_change<S: Simd>(
 /// # Safety
 /// The processor has the instruction set of `S`; `squares` is readable [`reach`] to both sides of the eight.
 #[inline(always)]
-unsafe fn radius<S: Simd>(depth: S::F, squares: *const f32, options: &PaperOptions) -> S::F {
+unsafe fn radius<S: Simd>(
+    depth: S::F,
+    squares: *const f32,
+    along: &[[f32; GROUP]],
+    options: &PaperOptions,
+) -> S::F {
     // SAFETY: as the caller's.
     unsafe {
         let wanted = S::mul(S::splat(options.beta), smallest_depth_change::<S>(depth, options));
@@ -272,15 +286,16 @@ unsafe fn radius<S: Simd>(depth: S::F, squares: *const f32, options: &PaperOptio
         let enough = S::and(there, S::mul(S::mul(more, more), S::splat(2.0)));
 
         let mut nearest = S::load(squares);
-        let mut column = 1;
-        loop {
-            let square = S::splat((column * column) as f32);
-            if S::bits(S::lt(square, S::min(nearest, enough))) == 0 {
+        let (mut column, mut distances) = (0, along.chunks_exact(AT_ONCE));
+        while let Some(along) = distances.next() {
+            if S::bits(S::lt(S::load(along[0].as_ptr()), S::min(nearest, enough))) == 0 {
                 break;
             }
-            let (left, right) = (S::load(squares.sub(column)), S::load(squares.add(column)));
-            nearest = S::min(nearest, S::add(S::min(left, right), square));
-            column += 1;
+            for along in along {
+                column += 1;
+                let (left, right) = (S::load(squares.sub(column)), S::load(squares.add(column)));
+                nearest = S::min(nearest, S::add(S::min(left, right), S::load(along.as_ptr())));
+            }
         }
         let distance = S::sqrt(nearest);
         let radius = S::min(wanted, S::div(distance, S::splat(std::f32::consts::SQRT_2)));

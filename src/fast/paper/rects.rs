@@ -1,0 +1,158 @@
+//! Where in a tile's rings eight windows lie (Eq. 3).
+
+use super::integrals::Counted;
+use crate::simd::{GROUP, Simd};
+
+type Indices = [i32; GROUP];
+
+/// The rings that the indices are for, and the pixels.
+#[derive(Clone, Copy)]
+pub(crate) struct Place {
+    /// Width and height of the image.
+    pub image: [usize; 2],
+    /// The first pixel of the eight.
+    pub x: usize,
+    pub y: usize,
+    /// The rings' first column, their elements from a row to the next, and their rows.
+    pub left: usize,
+    pub stride: usize,
+    pub rows: usize,
+}
+
+/// Indices of the elements that eight windows need.
+pub(crate) struct Rects {
+    /// Of the sums up to the windows' upper left, upper right, lower left and lower right corners.
+    pub corners: [Indices; 4],
+    /// Of the points at both ends of the middle row, and of the middle column.
+    pub ends: [[Indices; 2]; 2],
+    /// How many pixels these are apart.
+    pub spans: [[f32; GROUP]; 2],
+    /// The rings' elements from a row to the next, and their rows.
+    stride: usize,
+    rows: usize,
+}
+
+/// Pixel numbers in a group.
+const STEPS: [f32; GROUP] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+
+impl Rects {
+    /// The windows of eight radii, as `paper::smoothing_area::window` has them.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`. Indices are below 2^24.
+    #[inline(always)]
+    pub unsafe fn new<S: Simd>(place: &Place, radii: S::F, inner: bool, ends: bool) -> Self {
+        let mut rects = Rects {
+            corners: [[0; GROUP]; 4],
+            ends: [[[0; GROUP]; 2]; 2],
+            spans: [[0.0; GROUP]; 2],
+            stride: place.stride,
+            rows: place.rows,
+        };
+        // SAFETY: as the caller's; floats hold indices exactly.
+        unsafe {
+            let one = S::splat(1.0);
+            // Columns from the rings' first on, rows from the pixels' own on; ends are exclusive.
+            let x = S::add(S::load(STEPS.as_ptr()), S::splat((place.x - place.left) as f32));
+            let x = range::<S>(x, radii, -(place.left as f32), place.image[0] as f32);
+            let zero = S::splat(0.0);
+            let y = range::<S>(zero, radii, -(place.y as f32), place.image[1] as f32);
+
+            let edge = if inner { one } else { zero };
+            let (left, right) = (S::add(x[0], edge), S::sub(x[1], edge));
+            let above = row_start::<S>(place, S::sub(S::add(y[0], edge), one));
+            let last = row_start::<S>(place, S::sub(S::sub(y[1], edge), one));
+            store::<S>(&mut rects.corners[0], S::add(above, left));
+            store::<S>(&mut rects.corners[1], S::add(above, right));
+            store::<S>(&mut rects.corners[2], S::add(last, left));
+            store::<S>(&mut rects.corners[3], S::add(last, right));
+            if ends {
+                // The element of a column's point is the next one.
+                let column = S::add(middle::<S>(place, x), one);
+                let row = row_start::<S>(place, middle::<S>(place, y));
+                let last = row_start::<S>(place, S::sub(y[1], one));
+                store::<S>(&mut rects.ends[0][0], S::add(row, S::add(x[0], one)));
+                store::<S>(&mut rects.ends[0][1], S::add(row, x[1]));
+                store::<S>(&mut rects.ends[1][0], S::add(row_start::<S>(place, y[0]), column));
+                store::<S>(&mut rects.ends[1][1], S::add(last, column));
+                S::store(rects.spans[0].as_mut_ptr(), S::sub(S::sub(x[1], x[0]), one));
+                S::store(rects.spans[1].as_mut_ptr(), S::sub(S::sub(y[1], y[0]), one));
+            }
+        }
+        rects
+    }
+
+    /// Where an end of a window's middle row (`line` 0) or column is missing: the differences in x and y between the
+    /// outermost points that are there, and how far they are apart; zeros if there are not two.
+    pub fn outermost(&self, line: usize, lane: usize, points: &[Counted]) -> [f32; 4] {
+        let (step, count) = ([1, self.stride][line], self.spans[line][lane] as usize + 1);
+        let length = self.stride * self.rows;
+        let ends = self.ends[line];
+        let (mut a, mut b) = (ends[0][lane] as usize, ends[1][lane] as usize);
+        let (mut first, mut last) = (0, count - 1);
+        while points[a][3] == 0.0 && first < last {
+            (a, first) = (a + step, first + 1);
+            a -= if a >= length { length } else { 0 };
+        }
+        while points[b][3] == 0.0 && first < last {
+            (b, last) = (if b < step { b + length } else { b } - step, last - 1);
+        }
+        if first >= last {
+            return [0.0; 4];
+        }
+        let (a, b) = (&points[a], &points[b]);
+        [b[0] - a[0], b[1] - a[1], (last - first) as f32, 1.0]
+    }
+}
+
+/// The columns or rows around `at`, between `first` and `size` after that.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn range<S: Simd>(at: S::F, radii: S::F, first: f32, size: f32) -> [S::F; 2] {
+    // SAFETY: as the caller's.
+    unsafe {
+        let end = S::add(S::add(at, radii), S::splat(1.0));
+        [S::max(S::sub(at, radii), S::splat(first)), S::min(end, S::splat(first + size))]
+    }
+}
+
+/// Where rows, counted from the pixels' own, start in the rings.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn row_start<S: Simd>(place: &Place, row: S::F) -> S::F {
+    // SAFETY: as the caller's.
+    unsafe {
+        let rows = S::splat(place.rows as f32);
+        let at = S::add(S::splat((place.y % place.rows) as f32), row);
+        let at = S::add(at, S::and(S::lt(at, S::splat(0.0)), rows));
+        let at = S::sub(at, S::and_not(S::lt(at, rows), rows));
+        S::mul(at, S::splat(place.stride as f32))
+    }
+}
+
+/// `Rect::middle`
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn middle<S: Simd>(place: &Place, [start, end]: [S::F; 2]) -> S::F {
+    // SAFETY: as the caller's.
+    unsafe {
+        // Rounded down, also below zero.
+        let shift = S::splat(place.rows as f32);
+        let twice = S::sub(S::add(start, end), S::splat(1.0));
+        S::sub(S::truncate(S::add(S::mul(twice, S::splat(0.5)), shift)), shift)
+    }
+}
+
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn store<S: Simd>(to: &mut Indices, value: S::F) {
+    // SAFETY: as the caller's.
+    unsafe { S::store_i(to.as_mut_ptr(), S::truncate_i(value)) };
+}
