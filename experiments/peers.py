@@ -9,7 +9,8 @@ try:
     import cv2
     import numpy
 except ImportError:
-    sys.exit(print("skipped: OpenCV\nskipped: D2NT"))  # which needs both
+    print("skipped: OpenCV\nskipped: D2NT")  # which needs both
+    sys.exit()
 try:
     import d2nt
 except ImportError:

@@ -7,7 +7,6 @@ use crate::table::Row;
 
 const KNN: &str = "PCL-kNN";
 const SDC: &str = "iine SDC";
-const CM: &str = "iine CM";
 const POINTS: Axis = Axis { label: "points in the window", scale: Scale::Log };
 
 /// A name without the size, and how many points the window has.
@@ -17,11 +16,11 @@ fn name_and_points(who: &str) -> Result<(String, f64), String> {
     Ok((name.to_owned(), if name == KNN { size } else { size * size }))
 }
 
-/// Curves by name.
-type Curves = Vec<(String, Vec<(f64, f64)>)>;
+/// A method's name, and its values over the number of points.
+type Curve = (String, Vec<(f64, f64)>);
 
-fn curves(values: impl Iterator<Item = (String, f64)>) -> Result<Curves, String> {
-    let mut curves: Curves = Vec::new();
+fn curves(values: impl Iterator<Item = (String, f64)>) -> Result<Vec<Curve>, String> {
+    let mut curves: Vec<Curve> = Vec::new();
     for (who, value) in values {
         let (name, points) = name_and_points(&who)?;
         match curves.iter_mut().find(|(known, _)| *known == name) {
@@ -47,10 +46,9 @@ pub fn times(lines: &str) -> Drawn {
         }
     }
     let curves = curves(all.into_iter())?;
-    let mut text =
-        "| least ms, one thread | smallest window | largest window | slowest over fastest |\n\
+    let mut text = "| least ms | smallest window | largest window | slowest over fastest |\n\
                     |---|---:|---:|---:|\n"
-            .to_owned();
+        .to_owned();
     for (name, curve) in &curves {
         let (first, last) = (curve[0], curve[curve.len() - 1]);
         let slowest = curve.iter().map(|point| point.1).fold(0.0, f64::max);
@@ -69,54 +67,46 @@ pub fn times(lines: &str) -> Drawn {
     Ok((svg(&[panel], 1), text))
 }
 
-/// Fig. 5 (noise "0") or Fig. 8 (all others) from scores: a column of plots for every noise, one of the whole image, of
-/// what is near depth edges, and of what is near nothing; and what they say.
+/// Fig. 5 (noise "0") or Fig. 8 (all others) from scores: a column of plots for every noise, one of the whole image, one
+/// of what is near depth edges, and one of what is near neither those nor creases; and what they say.
 pub fn errors(rows: &[Row], noises: &[&str]) -> Drawn {
     let mut panels = Vec::new();
     let mut text = String::new();
     for band in ["all", "depth edges", "elsewhere"] {
+        let mut lines = Vec::new();
         for noise in noises {
             let rows: Vec<&Row> =
                 rows.iter().filter(|r| r.noise == *noise && r.band == band).collect();
             let curves = curves(rows.iter().map(|row| (row.who.clone(), row.mean)))?;
+            lines.extend(curves.iter().map(|curve| line(noise, curve, &curves, &rows)));
             let title = match *noise {
                 "0" => format!("No noise: {band}"),
                 sigma => format!("Noise in z of {sigma} m: {band}"),
             };
-            text += &table(&title, &curves, &rows);
             let y = Axis { label: "mean error in degrees", scale: Scale::Linear };
             panels.push(Panel { title, x: POINTS, y, curves });
         }
+        let some = panels.last().and_then(|panel| panel.curves.first());
+        let windows = some.into_iter().flat_map(|(_, curve)| curve);
+        let heads: String = windows.map(|(points, _)| format!(" {points} points |")).collect();
+        text += &format!(
+            "\nMean error in degrees, {band}:\n\n| noise, m | |{heads} times SDC's | cover % |\n"
+        );
+        text += &format!("|---|---|{}\n", "---:|".repeat(heads.matches('|').count() + 2));
+        text += &lines.concat();
     }
     Ok((svg(&panels, noises.len()), text))
 }
 
-/// The errors by method and window, with the coverage of the largest window.
-fn table(title: &str, curves: &Curves, rows: &[&Row]) -> String {
-    let Some((_, first)) = curves.first() else { return String::new() };
-    let heads: Vec<String> = first.iter().map(|(points, _)| format!("{points} points")).collect();
-    let mut text =
-        format!("\n{title}; mean error in degrees\n\n| | {} | cover % |\n", heads.join(" | "));
-    text += &format!("|---|{}\n", "---:|".repeat(heads.len() + 1));
-    for (name, curve) in curves {
-        let errors: Vec<String> = curve.iter().map(|(_, error)| format!("{error:.2}")).collect();
-        let last = rows.iter().rev().find(|row| row.who.starts_with(name.as_str()));
-        let coverage = last.map_or(f64::NAN, |row| 100.0 * row.coverage());
-        text += &format!("| {name} | {} | {coverage:.1} |\n", errors.join(" | "));
-    }
-    for other in [CM, KNN] {
-        text += &ratio(curves, other);
-    }
-    text
-}
-
-/// How many times another method's error is SDC's.
-fn ratio(curves: &Curves, other: &str) -> String {
-    let curve = |name: &str| curves.iter().find(|(known, _)| known == name).map(|(_, curve)| curve);
-    let Some((sdc, other_curve)) = curve(SDC).zip(curve(other)) else { return String::new() };
-    let ratios = sdc.iter().zip(other_curve).map(|(sdc, other)| other.1 / sdc.1);
-    let (least, most) = ratios.fold((f64::INFINITY, 0f64), |(a, b), r| (a.min(r), b.max(r)));
-    format!("\nThe error of {other} is {least:.2} to {most:.2} times that of SDC.\n")
+/// A method's errors by window, the least and the most that they are of SDC's in the same window, and the coverage.
+fn line(noise: &str, (name, curve): &Curve, all: &[Curve], rows: &[&Row]) -> String {
+    let errors: String = curve.iter().map(|(_, error)| format!(" {error:.2} |")).collect();
+    let sdc = all.iter().find(|(known, _)| known == SDC).map_or(&[][..], |(_, sdc)| sdc);
+    let ratios = || curve.iter().zip(sdc).map(|((_, error), (_, sdc))| error / sdc);
+    let (least, most) = (ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max));
+    let row = rows.iter().find(|row| row.who.starts_with(&format!("{name}-")));
+    let coverage = row.map_or(f64::NAN, |row| 100.0 * row.coverage());
+    format!("| {noise} | {name} |{errors} {least:.2} to {most:.2} | {coverage:.1} |\n")
 }
 
 /// What the lines "FRAME,FIXED,ADAPTIVE" of Fig. 9 say, after one with their names.
