@@ -239,16 +239,6 @@ impl<'a> Points<'a> {
         }
     }
 
-    /// The 16 bytes from a point's x, as floats.
-    ///
-    /// # Safety
-    /// As [`Points::at_unchecked`]; the points are whole ([`Points::has_whole_points`]), and this is not the last.
-    #[inline(always)]
-    pub(crate) unsafe fn whole_at_unchecked(&self, x: usize, y: usize) -> [f32; 4] {
-        // SAFETY: promised by the caller.
-        unsafe { self.x.byte_add(self.grid.offset(x, y)).cast::<[f32; 4]>().read_unaligned() }
-    }
-
     /// The depth at column `x`, row `y`.
     ///
     /// # Panics
@@ -274,6 +264,23 @@ impl<'a> Points<'a> {
         assert!(y < self.grid.height);
         // SAFETY: row y is inside the grid that the constructor vouched for.
         (unsafe { self.z.byte_add(y * self.grid.row_stride) }, self.grid.point_stride)
+    }
+
+    /// Asks for the cache lines of row `y`, if there is one, in `columns`: the hardware does not see the next row
+    /// coming where rows are read in pieces.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, y: usize, columns: Range<usize>) {
+        #[cfg(target_arch = "x86_64")]
+        if y < self.grid.height {
+            use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+            let (start, end) = (self.grid.offset(columns.start, y), self.grid.offset(columns.end, y));
+            for line in (start..end).step_by(LINE) {
+                // SAFETY: a prefetch reads and writes nothing, whatever the address.
+                unsafe { _mm_prefetch::<_MM_HINT_T0>(self.z.wrapping_byte_add(line).cast()) };
+            }
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        let _ = (y, columns);
     }
 
     /// Whether the 16 bytes from a point's x are part of the same cloud, and of nothing that `normals` writes, for
@@ -364,6 +371,10 @@ impl<'a> Points<'a> {
         }
     }
 }
+
+/// Bytes of a cache line.
+#[cfg(target_arch = "x86_64")]
+const LINE: usize = 64;
 
 /// Where normals go: nx, ny, nz and, if wanted, the curvature of every pixel. Other bytes stay untouched.
 #[derive(Debug)]

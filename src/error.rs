@@ -23,7 +23,8 @@ pub enum Error {
     Overlap = 6,
     /// An option's value is outside its range, or an enum's number is unknown.
     OptionValue = 7,
-    /// The method does not support the border policy (SIMPLE_3D_GRADIENT with MIRROR).
+    /// Options or maps that do not go together: `Simple3DGradient` with `Mirror` or with the paper's semantics, depth
+    /// radii without the paper's semantics, eigenvalues without `CovarianceMatrix`.
     Unsupported = 8,
     /// An index is negative or not below width x height.
     Index = 9,
@@ -63,7 +64,7 @@ impl Error {
             Error::Overlap => c"output bytes overlap input bytes or other output bytes",
             Error::OptionValue => c"an option's value is outside its range",
             Error::Unsupported => {
-                c"BORDER_POLICY_MIRROR is not supported for the method SIMPLE_3D_GRADIENT"
+                c"the method does not support this border policy, these semantics or this map"
             }
             Error::Index => c"an index is outside the cloud",
             Error::OutOfMemory => c"out of memory",

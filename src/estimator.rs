@@ -6,14 +6,17 @@ use crate::depth_change::depth_change_map;
 use crate::distance::distance_map;
 use crate::fast::{self, SMALLEST_IMAGE, Scratch};
 use crate::isa::Isa;
-use crate::methods::{Estimate, estimate, estimate_window};
-use crate::options::{Options, Semantics};
+use crate::methods::{Estimate, covariance_matrix, estimate, estimate_window};
+use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
-use crate::paper::PaperMaps;
+use crate::paper::{self, PaperMaps, with_missing_as_nan};
 use crate::smoothing_area::window_side;
 use crate::window::Image;
 
-/// The maps behind the normals; each is written if it is there and must hold width x height elements, row by row.
+/// The maps behind the normals; each is written if it is there and must hold width x height elements, row by row,
+/// unless it says otherwise.
+///
+/// They are those of the smoothing area map's own windows, whatever `one_sided_windows` and `crease_windows` say.
 #[derive(Debug, Default)]
 pub struct Maps<'a> {
     /// Radius that the depth asks for (the paper's B, Eq. 5), within its limits, in pixels; NaN at missing points.
@@ -26,6 +29,11 @@ pub struct Maps<'a> {
     /// Smoothing area map: the side of the pixel's window in pixels, or with
     /// [`Semantics::Paper`](crate::Semantics::Paper) its radius R (Eq. 8); 0 where there is no window.
     pub smoothing_areas: Option<&'a mut [f32]>,
+    /// Eigenvalues of the covariance matrix (Eq. 16) of the finite points in every pixel's window, ascending, for
+    /// edge and corner detection: three for every pixel, one after the other, so that this map holds
+    /// 3 x width x height elements. In the cloud's unit squared; NaN where there is no window. Only with
+    /// [`Method::CovarianceMatrix`](crate::Method::CovarianceMatrix).
+    pub eigenvalues: Option<&'a mut [f32]>,
 }
 
 /// Estimates the normals of organized point clouds. Owns its scratch memory, which is reused from frame to frame.
@@ -170,7 +178,9 @@ impl Estimator {
     /// depth changes, the smoothing size and the ignored border say; writes it to `normal`, which must be 1 x 1.
     ///
     /// The window starts at `(x - width / 2, y - height / 2)`; what lies outside the image is clipped, or folded
-    /// back with [`BorderPolicy::Mirror`](crate::BorderPolicy::Mirror). NaN if it gives no normal.
+    /// back with [`BorderPolicy::Mirror`](crate::BorderPolicy::Mirror), which
+    /// [`Semantics::Paper`](crate::Semantics::Paper) does not have. NaN if it gives no normal. Takes time
+    /// proportional to the window, or with that semantics or `zero_is_missing` to the cloud.
     /// Errors: as [`Estimator::compute`], and [`Error::Index`] if the pixel is outside the cloud.
     pub fn compute_window(
         &mut self,
@@ -187,10 +197,19 @@ impl Estimator {
             return Err(Error::Index);
         }
         normal.check_disjoint(points)?;
-        let border_policy = self.options.border_policy;
-        let image = Image { width: points.width(), height: points.height(), border_policy };
         let size = (width as usize, height as usize);
-        let found = estimate_window(self.options.method, points, &image, (x, y), size);
+        let found = match self.options.semantics {
+            Semantics::Pcl => {
+                let (width, height) = (points.width(), points.height());
+                let cleaned = self.without_zeros(points);
+                let cleaned = cleaned.as_ref().map(|cleaned| packed(cleaned, width, height));
+                let border_policy = self.options.border_policy;
+                let image = Image { width, height, border_policy };
+                let points = cleaned.as_ref().unwrap_or(points);
+                estimate_window(self.options.method, points, &image, (x, y), size)
+            }
+            Semantics::Paper => paper::estimate_window(points, &self.options, (x, y), size),
+        };
         let towards = turn_to_viewpoint(found.normal, points.at(x, y), self.options.viewpoint);
         // SAFETY: `normal` has this one element, and no other thread is at work.
         unsafe { normal.write(0, 0, towards, found.curvature) };
@@ -199,8 +218,8 @@ impl Estimator {
 
     /// Computes the maps behind the normals.
     ///
-    /// Errors: [`Error::Size`] if a map's length is not width x height, [`Error::Unsupported`] for a map that the
-    /// semantics does not have, and what [`Options::check`] refuses.
+    /// Errors: [`Error::Size`] if a map's length is wrong, [`Error::Unsupported`] for a map that the semantics or the
+    /// method does not have, and what [`Options::check`] refuses.
     pub fn compute_maps(&mut self, points: &Points, maps: &mut Maps) -> Result<(), Error> {
         self.options.check()?;
         let (width, height) = (points.width(), points.height());
@@ -210,9 +229,20 @@ impl Estimator {
             maps.distances.as_ref().map(|map| map.len()),
             maps.smoothing_areas.as_ref().map(|map| map.len()),
         ];
-        if lengths.into_iter().flatten().any(|length| length != width * height) {
+        let eigenvalues = maps.eigenvalues.as_ref().map_or(3 * width * height, |map| map.len());
+        if lengths.into_iter().flatten().any(|length| length != width * height)
+            || eigenvalues != 3 * width * height
+        {
             return Err(Error::Size);
         }
+        if maps.eigenvalues.is_some() && self.options.method != Method::CovarianceMatrix
+            || maps.depth_radii.is_some() && self.options.semantics != Semantics::Paper
+        {
+            return Err(Error::Unsupported);
+        }
+        let cleaned = self.without_zeros(points);
+        let cleaned = cleaned.as_ref().map(|cleaned| packed(cleaned, width, height));
+        let points = cleaned.as_ref().unwrap_or(points);
         let write = |map: &mut Option<&mut [f32]>, from: &[f32]| {
             if let Some(map) = map {
                 map.copy_from_slice(from);
@@ -220,9 +250,6 @@ impl Estimator {
         };
         let depth_changes = match self.options.semantics {
             Semantics::Pcl => {
-                if maps.depth_radii.is_some() {
-                    return Err(Error::Unsupported);
-                }
                 let plain = Plain::new(points, &self.options);
                 write(&mut maps.distances, &plain.distances);
                 if let Some(map) = &mut maps.smoothing_areas {
@@ -230,14 +257,24 @@ impl Estimator {
                         *to = plain.window_side(at % width, at / width) as f32;
                     }
                 }
+                if let Some(map) = &mut maps.eigenvalues {
+                    for (at, to) in map.as_chunks_mut().0.iter_mut().enumerate() {
+                        *to = plain.eigenvalues(at % width, at / width);
+                    }
+                }
                 plain.depth_changes
             }
             Semantics::Paper => {
-                let paper = PaperMaps::new(points, &self.options);
-                write(&mut maps.depth_radii, &paper.depth_radii);
-                write(&mut maps.distances, &paper.distances);
-                write(&mut maps.smoothing_areas, &paper.smoothing_radii);
-                paper.depth_changes
+                let of_paper = PaperMaps::new(points, &self.options);
+                write(&mut maps.depth_radii, &of_paper.depth_radii);
+                write(&mut maps.distances, &of_paper.distances);
+                write(&mut maps.smoothing_areas, &of_paper.smoothing_radii);
+                if let Some(map) = &mut maps.eigenvalues {
+                    let values =
+                        paper::eigenvalue_map(points, &self.options, &of_paper.smoothing_radii);
+                    map.copy_from_slice(values.as_flattened());
+                }
+                of_paper.depth_changes
             }
         };
         if let Some(map) = &mut maps.depth_changes {
@@ -248,9 +285,14 @@ impl Estimator {
         Ok(())
     }
 
+    /// A copy of the points without zeros, where those are missing.
+    fn without_zeros(&self, points: &Points) -> Option<Vec<[f32; 3]>> {
+        self.options.zero_is_missing.then(|| with_missing_as_nan(points, &self.options))
+    }
+
     /// All pixels' estimates where PCL's windows and sums alone are not what is asked for.
     fn estimates(&self, points: &Points) -> Vec<Estimate> {
-        crate::paper::estimates(points, &self.options, |points| {
+        paper::estimates(points, &self.options, |points| {
             let plain = Plain::new(points, &self.options);
             let pixels =
                 (0..points.height()).flat_map(|y| (0..points.width()).map(move |x| (x, y)));
@@ -267,6 +309,12 @@ impl Estimator {
     pub fn release_scratch(&mut self) {
         self.scratch = Scratch::default();
     }
+}
+
+/// A view of packed points, as many as the size says.
+fn packed(points: &[[f32; 3]], width: usize, height: usize) -> Points<'_> {
+    Points::interleaved(points.as_flattened(), width, height, 3, 0)
+        .expect("a packed copy of a valid cloud")
 }
 
 /// The plain form of the whole method: the specification that every fast path is held to.
@@ -307,5 +355,12 @@ impl<'a> Plain<'a> {
         let point = self.points.at(x, y);
         let normal = turn_to_viewpoint(found.normal, point, self.options.viewpoint);
         Estimate { normal, ..found }
+    }
+
+    /// The eigenvalues of the covariance matrix of a pixel's window.
+    fn eigenvalues(&self, x: usize, y: usize) -> [f32; 3] {
+        let side = self.window_side(x, y) as usize;
+        let values = covariance_matrix::eigenvalues(self.points, &self.image, (x, y), (side, side));
+        values.map_or([f32::NAN; 3], |values| values.map(|value| value as f32))
     }
 }

@@ -153,7 +153,8 @@ impl PaperOptions {
         disparity_step / (focal * baseline)
     }
 
-    fn check(&self) -> Result<(), Error> {
+    /// Refuses what is out of range.
+    pub(crate) fn check(&self) -> Result<(), Error> {
         let positive = |number: f32| number.is_finite() && number > 0.0;
         let in_range = positive(self.alpha)
             && positive(self.beta)
@@ -190,7 +191,7 @@ pub struct Options {
     pub threads: usize,
     /// Whose windows and sums; default [`Semantics::Pcl`].
     pub semantics: Semantics,
-    /// The parameters of [`Semantics::Paper`].
+    /// The parameters of [`Semantics::Paper`] and of `crease_windows`.
     pub paper: PaperOptions,
     /// Takes points at (0, 0, 0) as missing, as LiDARs and some depth cameras write them; default off.
     pub zero_is_missing: bool,
@@ -198,7 +199,8 @@ pub struct Options {
     /// two neighbours on its surface not in line with it; default off.
     pub one_sided_windows: bool,
     /// In a second pass moves windows off the places where the normals of the first vary strongly, so that edges
-    /// without a depth change stay sharp; default off.
+    /// without a depth change stay sharp; default off. Takes the sensor's [`PaperOptions::alpha`] in either
+    /// semantics.
     pub crease_windows: bool,
 }
 
@@ -229,6 +231,10 @@ impl Options {
                 return Err(Error::Unsupported);
             }
             return self.paper.check();
+        }
+        if self.crease_windows {
+            // They ask for alpha.
+            self.paper.check()?;
         }
         if !(self.normal_smoothing_size.is_finite() && self.normal_smoothing_size > 0.0) {
             return Err(Error::OptionValue);

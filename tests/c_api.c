@@ -4,6 +4,7 @@
 #include <iine/iine.h>
 
 #include <math.h>
+#include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -205,6 +206,65 @@ static void test_options(void) {
   iine_estimator_free(e);
 }
 
+/* One setter of a number of an enum or of a switch: what is known is taken, all else and NULL refused. */
+static void check_numbers(int32_t (*set)(iine_estimator *, int32_t), int32_t last, int line) {
+  static const int32_t unknown[] = {-1, 2, 99, INT32_MAX, INT32_MIN};
+  iine_estimator *const e = new_estimator();
+  int32_t i;
+  for (i = 0; i <= last; ++i) {
+    check_status(set(e, i), IINE_OK, "a known number", line);
+    check_status(set(NULL, i), IINE_ERROR_NULL_POINTER, "NULL", line);
+  }
+  for (i = 0; i < (int32_t)(sizeof unknown / sizeof *unknown); ++i) {
+    check_status(set(e, unknown[i]), IINE_ERROR_OPTION_VALUE, "an unknown number", line);
+  }
+  iine_estimator_free(e);
+}
+
+/* One setter of a finite number above 0. */
+static void check_positive(int32_t (*set)(iine_estimator *, float), int line) {
+  static const float refused[] = {0.0f, -0.0f, -1.0f, NAN, INFINITY, -INFINITY};
+  iine_estimator *const e = new_estimator();
+  size_t i;
+  check_status(set(e, 1e-30f), IINE_OK, "small", line);
+  check_status(set(e, 1e30f), IINE_OK, "large", line);
+  check_status(set(NULL, 1.0f), IINE_ERROR_NULL_POINTER, "NULL", line);
+  for (i = 0; i < sizeof refused / sizeof *refused; ++i) {
+    check_status(set(e, refused[i]), IINE_ERROR_OPTION_VALUE, "not a finite number above 0", line);
+  }
+  iine_estimator_free(e);
+}
+
+static void test_paper_options(void) {
+  iine_estimator *const e = new_estimator();
+  CHECK(IINE_SEMANTICS_PCL == 0 && IINE_SEMANTICS_PAPER == 1);
+  CHECK(IINE_DISTANCE_METRIC_EUCLIDEAN == 0 && IINE_DISTANCE_METRIC_CHAMFER == 1);
+  CHECK(IINE_DEPTH_Z == 0 && IINE_DEPTH_RANGE == 1);
+  check_numbers(iine_estimator_set_semantics, 1, __LINE__);
+  check_numbers(iine_estimator_set_paper_distance_metric, 1, __LINE__);
+  check_numbers(iine_estimator_set_paper_depth, 1, __LINE__);
+  check_numbers(iine_estimator_set_zero_is_missing, 1, __LINE__);
+  check_numbers(iine_estimator_set_one_sided_windows, 1, __LINE__);
+  check_numbers(iine_estimator_set_crease_windows, 1, __LINE__);
+  check_positive(iine_estimator_set_paper_alpha, __LINE__);
+  check_positive(iine_estimator_set_paper_beta, __LINE__);
+  check_positive(iine_estimator_set_paper_gamma, __LINE__);
+
+  STATUS(IINE_OK, iine_estimator_set_paper_radii(e, 1, 1, 1));
+  STATUS(IINE_OK, iine_estimator_set_paper_radii(e, 1000, 1000, 1000));
+  STATUS(IINE_OK, iine_estimator_set_paper_radii(e, 2, 5, 20));
+  STATUS(IINE_ERROR_OPTION_VALUE, iine_estimator_set_paper_radii(e, 0, 5, 20));
+  STATUS(IINE_ERROR_OPTION_VALUE, iine_estimator_set_paper_radii(e, 6, 5, 20));
+  STATUS(IINE_ERROR_OPTION_VALUE, iine_estimator_set_paper_radii(e, 2, 21, 20));
+  STATUS(IINE_ERROR_OPTION_VALUE, iine_estimator_set_paper_radii(e, 2, 5, 1001));
+  STATUS(IINE_ERROR_OPTION_VALUE, iine_estimator_set_paper_radii(e, 2, 5, UINT32_MAX));
+  STATUS(IINE_ERROR_NULL_POINTER, iine_estimator_set_paper_radii(NULL, 2, 5, 20));
+  iine_estimator_free(e);
+
+  CHECK(fabsf(iine_alpha_of_sensor(0.125f, 580.0f, 0.075f) - 0.0028736f) < 1e-7f);
+  CHECK(!(iine_alpha_of_sensor(0.125f, 0.0f, 0.075f) < INFINITY));
+}
+
 /* An option that was refused has not changed: results stay those of the last accepted ones. */
 static void test_refused_options_change_nothing(void) {
   static float expected[4 * PIXELS];
@@ -217,6 +277,10 @@ static void test_refused_options_change_nothing(void) {
   iine_estimator_set_normal_smoothing_size(e, NAN);
   iine_estimator_set_depth_dependent_smoothing(e, 99);
   iine_estimator_set_threads(e, 9999);
+  iine_estimator_set_semantics(e, 99);
+  iine_estimator_set_zero_is_missing(e, 99);
+  iine_estimator_set_one_sided_windows(e, 99);
+  iine_estimator_set_crease_windows(e, 99);
   STATUS(IINE_OK, iine_estimator_compute(e, &points, &to_actual));
   CHECK(memcmp(expected, normals_out, sizeof expected) == 0);
   iine_estimator_free(e);
@@ -572,7 +636,7 @@ static void test_window(void) {
 
 static void test_maps(void) {
   static uint8_t depth_changes[PIXELS + 4], untouched_changes[PIXELS + 4];
-  static float distances[PIXELS + 1], areas[PIXELS + 1], untouched[PIXELS + 1];
+  static float distances[PIXELS + 1], areas[PIXELS + 1], untouched[PIXELS + 1], three[4 * PIXELS];
   iine_estimator *const e = new_estimator();
   const iine_points points = cloud_points();
   iine_points bad_points = points;
@@ -623,6 +687,27 @@ static void test_maps(void) {
   maps = all;
   maps.distances = &cloud[PIXELS - 1].z;
   STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_maps(e, &points, &maps));
+  maps = all;
+  maps.eigenvalues = three;
+  maps.smoothing_areas = three + 3 * PIXELS - 1;
+  STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_maps(e, &points, &maps));
+  maps = all;
+  maps.depth_radii = distances;
+  STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_maps(e, &points, &maps));
+  maps = all;
+  maps.depth_radii = misaligned(three);
+  STATUS(IINE_ERROR_MISALIGNED, iine_estimator_compute_maps(e, &points, &maps));
+  maps = all;
+  maps.eigenvalues = misaligned(three);
+  STATUS(IINE_ERROR_MISALIGNED, iine_estimator_compute_maps(e, &points, &maps));
+  maps = all;
+  maps.depth_radii = three; /* not with PCL's semantics */
+  STATUS(IINE_ERROR_UNSUPPORTED, iine_estimator_compute_maps(e, &points, &maps));
+  maps = all;
+  maps.eigenvalues = three; /* not with this method */
+  STATUS(IINE_ERROR_UNSUPPORTED, iine_estimator_compute_maps(e, &points, &maps));
+  maps.struct_size = sizeof all - sizeof(float *);
+  STATUS(IINE_ERROR_STRUCT_SIZE, iine_estimator_compute_maps(e, &points, &maps));
   CHECK(memcmp(depth_changes, untouched_changes, sizeof depth_changes) == 0);
   CHECK(memcmp(distances, untouched, sizeof distances) == 0);
   CHECK(memcmp(areas, untouched, sizeof areas) == 0);
@@ -651,6 +736,40 @@ static void test_maps(void) {
   CHECK(memcmp(distances + PIXELS, untouched + PIXELS, sizeof(float)) == 0);
   CHECK(memcmp(areas + PIXELS, untouched + PIXELS, sizeof(float)) == 0);
   CHECK(memcmp(before, cloud, sizeof cloud) == 0);
+
+  /* A program made for the first version of the struct has no more fields: what lies there is not read. */
+  maps = all;
+  maps.struct_size = offsetof(iine_maps, depth_radii);
+  maps.depth_radii = misaligned(distances);
+  maps.eigenvalues = distances;
+  memset(distances, 0x5a, sizeof distances);
+  STATUS(IINE_OK, iine_estimator_compute_maps(e, &points, &maps));
+  CHECK(memcmp(distances, untouched, sizeof *distances) != 0);
+
+  /* The eigenvalues, of as many points as the windows have. */
+  STATUS(IINE_OK, iine_estimator_set_method(e, IINE_METHOD_COVARIANCE_MATRIX));
+  memset(three, 0x5a, sizeof three);
+  maps = all;
+  maps.eigenvalues = three;
+  STATUS(IINE_OK, iine_estimator_compute_maps(e, &points, &maps));
+  for (i = 0; i < PIXELS; ++i) {
+    const float *const values = three + 3 * i;
+    if (areas[i] == 0.0f) {
+      CHECK(isnan(values[0]) && isnan(values[1]) && isnan(values[2]));
+    } else {
+      CHECK(0.0f <= values[0] && values[0] <= values[1] && values[1] <= values[2] && values[2] < 0.1f);
+    }
+  }
+  CHECK(memcmp(three + 3 * PIXELS, untouched, sizeof *untouched) == 0);
+
+  /* And the paper's radii. */
+  STATUS(IINE_OK, iine_estimator_set_semantics(e, IINE_SEMANTICS_PAPER));
+  maps.depth_radii = three;
+  maps.eigenvalues = NULL;
+  STATUS(IINE_OK, iine_estimator_compute_maps(e, &points, &maps));
+  for (i = 0; i < PIXELS; ++i) {
+    CHECK(isnan(three[i]) ? isnan(cloud[i].z) && areas[i] == 0.0f : areas[i] <= three[i] && three[i] >= 5.0f);
+  }
   iine_estimator_free(e);
 }
 
@@ -680,6 +799,177 @@ static void test_scratch(void) {
   iine_estimator_free(e);
 }
 
+/* The smoothing area map R of the paper, with all options as they are. */
+static void paper_radii(iine_estimator *e, float *to) {
+  const iine_points points = cloud_points();
+  iine_maps maps;
+  memset(&maps, 0, sizeof maps);
+  maps.struct_size = sizeof maps;
+  maps.smoothing_areas = to;
+  STATUS(IINE_OK, iine_estimator_compute_maps(e, &points, &maps));
+}
+
+/* Every option of the paper's semantics has its effect, and one that is refused has none. */
+static void test_paper(void) {
+  static float radii[PIXELS], other[PIXELS], expected[4 * PIXELS];
+  iine_estimator *const e = new_estimator();
+  const iine_points points = cloud_points();
+  const iine_normals to_expected = packed_normals(expected), to_actual = packed_normals(normals_out);
+  const int inside = 12 * WIDTH + 8, corner = 0, hole = 20 * WIDTH + 10, edge = 15 * WIDTH + WIDTH / 2 - 1;
+  int32_t method;
+  int i, missing;
+  STATUS(IINE_OK, iine_estimator_set_semantics(e, IINE_SEMANTICS_PAPER));
+  /* The plane is steep: only the step is a depth change. */
+  STATUS(IINE_OK, iine_estimator_set_paper_gamma(e, 100.0f));
+  paper_radii(e, radii);
+  CHECK(radii[inside] == 5.0f && radii[corner] == 5.0f);
+  CHECK(radii[hole] == 0.0f && radii[edge] == 0.0f);
+  STATUS(IINE_ERROR_OPTION_VALUE, iine_estimator_set_paper_alpha(e, NAN));
+  STATUS(IINE_ERROR_OPTION_VALUE, iine_estimator_set_paper_beta(e, -1.0f));
+  STATUS(IINE_ERROR_OPTION_VALUE, iine_estimator_set_paper_gamma(e, 0.0f));
+  STATUS(IINE_ERROR_OPTION_VALUE, iine_estimator_set_paper_radii(e, 3, 2, 1));
+  STATUS(IINE_ERROR_OPTION_VALUE, iine_estimator_set_paper_distance_metric(e, 2));
+  STATUS(IINE_ERROR_OPTION_VALUE, iine_estimator_set_paper_depth(e, 2));
+  paper_radii(e, other);
+  CHECK(memcmp(radii, other, sizeof radii) == 0);
+
+  STATUS(IINE_OK, iine_estimator_set_paper_beta(e, 4000.0f));
+  paper_radii(e, other);
+  CHECK(other[corner] == 4000.0f * (0.0028f * cloud[corner].z * cloud[corner].z));
+  STATUS(IINE_OK, iine_estimator_set_paper_alpha(e, 0.0025f));
+  paper_radii(e, other);
+  CHECK(other[corner] == 4000.0f * (0.0025f * cloud[corner].z * cloud[corner].z));
+  STATUS(IINE_OK, iine_estimator_set_paper_radii(e, 1, 4, 7));
+  paper_radii(e, other);
+  CHECK(other[corner] == 7.0f);
+  STATUS(IINE_OK, iine_estimator_set_paper_beta(e, 1e-3f));
+  paper_radii(e, other);
+  CHECK(other[corner] == 4.0f);
+  STATUS(IINE_OK, iine_estimator_set_paper_radii(e, 4, 4, 7));
+  paper_radii(e, other);
+  CHECK(other[15 * WIDTH + WIDTH / 2 - 6] == 0.0f); /* 5 px from the change, 3.5 of radius */
+  STATUS(IINE_OK, iine_estimator_set_paper_radii(e, 1, 4, 7));
+  STATUS(IINE_OK, iine_estimator_set_paper_gamma(e, 0.1f));
+  paper_radii(e, other);
+  CHECK(other[corner] == 0.0f); /* every pixel is a change now */
+
+  /* Depth by the range is more than by z. */
+  iine_estimator_free(e);
+  {
+    iine_estimator *const f = new_estimator();
+    STATUS(IINE_OK, iine_estimator_set_semantics(f, IINE_SEMANTICS_PAPER));
+    STATUS(IINE_OK, iine_estimator_set_paper_gamma(f, 100.0f));
+    STATUS(IINE_OK, iine_estimator_set_paper_beta(f, 4000.0f));
+    paper_radii(f, radii);
+    STATUS(IINE_OK, iine_estimator_set_paper_depth(f, IINE_DEPTH_RANGE));
+    paper_radii(f, other);
+    CHECK(other[corner] > radii[corner]);
+    STATUS(IINE_OK, iine_estimator_set_paper_depth(f, IINE_DEPTH_Z));
+    STATUS(IINE_OK, iine_estimator_set_paper_distance_metric(f, IINE_DISTANCE_METRIC_CHAMFER));
+    /* The nearest depth change is two columns and one row away: 7 / 3, not the square root of 5. */
+    cloud[15 * WIDTH + 8].z -= 0.5f;
+    {
+      static float distances[PIXELS];
+      iine_maps maps;
+      memset(&maps, 0, sizeof maps);
+      maps.struct_size = sizeof maps;
+      maps.distances = distances;
+      STATUS(IINE_OK, iine_estimator_compute_maps(f, &points, &maps));
+      CHECK(distances[16 * WIDTH + 10] == 7.0f / 3.0f);
+    }
+    iine_estimator_free(f);
+  }
+  fill_cloud();
+
+  /* The methods; SIMPLE_3D_GRADIENT is refused and writes nothing. */
+  {
+    iine_estimator *const f = new_estimator();
+    STATUS(IINE_OK, iine_estimator_set_semantics(f, IINE_SEMANTICS_PAPER));
+    STATUS(IINE_OK, iine_estimator_set_paper_gamma(f, 100.0f));
+    for (method = 0; method < IINE_METHOD_SIMPLE_3D_GRADIENT; ++method) {
+      STATUS(IINE_OK, iine_estimator_set_method(f, method));
+      STATUS(IINE_OK, iine_estimator_compute(f, &points, &to_expected));
+      CHECK(expected[4 * inside] > 0.97f && expected[4 * corner] > 0.97f);
+      CHECK(isnan(expected[4 * hole]) && isnan(expected[4 * edge]));
+      CHECK(isnan(expected[4 * inside + 3]) == (method != IINE_METHOD_COVARIANCE_MATRIX));
+      {
+        const int32_t indices[2] = {12 * WIDTH + 8, 0};
+        STATUS(IINE_OK, iine_estimator_compute_indices(f, &points, indices, 2, &to_actual));
+        CHECK(memcmp(normals_out, expected + 4 * inside, 4 * sizeof(float)) == 0);
+        CHECK(memcmp(normals_out + 4, expected, 4 * sizeof(float)) == 0);
+      }
+      STATUS(IINE_OK, iine_estimator_compute_window(f, &points, 8, 12, 11, 11, &to_actual));
+      for (i = 0; i < 3; ++i) {
+        CHECK(fabsf(normals_out[i] - expected[4 * inside + i]) < 1e-5f);
+      }
+
+      STATUS(IINE_OK, iine_estimator_set_one_sided_windows(f, 1));
+      STATUS(IINE_OK, iine_estimator_compute(f, &points, &to_actual));
+      STATUS(IINE_OK, iine_estimator_set_one_sided_windows(f, 0));
+      for (i = 0, missing = 0; i < PIXELS; ++i) {
+        missing += isnan(normals_out[4 * i]) ? 1 : 0;
+      }
+      CHECK(missing == 1); /* the hole */
+      CHECK(normals_out[4 * edge] > 0.97f && normals_out[4 * edge + 4] > 0.9f); /* before and behind the step */
+    }
+    STATUS(IINE_OK, iine_estimator_set_method(f, IINE_METHOD_SIMPLE_3D_GRADIENT));
+    refuse(IINE_ERROR_UNSUPPORTED, f, &points, &to_actual, __LINE__);
+    STATUS(IINE_ERROR_UNSUPPORTED, iine_estimator_compute_window(f, &points, 12, 12, 5, 5, &to_actual));
+    iine_estimator_free(f);
+  }
+
+  /* Zeros are points, or missing. */
+  for (i = 0; i < PIXELS; ++i) {
+    if (isnan(cloud[i].x)) {
+      cloud[i].x = cloud[i].y = cloud[i].z = 0.0f;
+    }
+  }
+  for (i = 0; i < 2; ++i) {
+    iine_estimator *const f = new_estimator();
+    STATUS(IINE_OK, iine_estimator_set_zero_is_missing(f, i));
+    STATUS(IINE_OK, iine_estimator_set_one_sided_windows(f, 1));
+    STATUS(IINE_OK, iine_estimator_compute(f, &points, &to_actual));
+    STATUS(IINE_OK, iine_estimator_set_semantics(f, IINE_SEMANTICS_PAPER));
+    STATUS(IINE_OK, iine_estimator_compute(f, &points, &to_expected));
+    CHECK(isnan(normals_out[4 * hole]) || i == 0);
+    CHECK(isnan(expected[4 * hole]) || i == 0);
+    paper_radii(f, radii);
+    CHECK(radii[hole - 1] > 0.0f || i == 0);
+    iine_estimator_free(f);
+  }
+}
+
+/* A valley between two planes: with crease windows the normals next to it are those of the planes. */
+static void test_crease_windows(void) {
+  iine_estimator *const e = new_estimator();
+  const iine_points points = cloud_points();
+  const iine_normals normals = packed_normals(normals_out);
+  float worst[2] = {0.0f, 0.0f};
+  int i, pass;
+  for (i = 0; i < PIXELS; ++i) {
+    const float u = 0.004f * (float)(i % WIDTH - WIDTH / 2);
+    cloud[i].z = 1.0f / (1.0f + fabsf(u));
+    cloud[i].x = u * cloud[i].z;
+    cloud[i].y = 0.004f * (float)(i / WIDTH - HEIGHT / 2) * cloud[i].z;
+  }
+  STATUS(IINE_OK, iine_estimator_set_method(e, IINE_METHOD_COVARIANCE_MATRIX));
+  STATUS(IINE_OK, iine_estimator_set_semantics(e, IINE_SEMANTICS_PAPER));
+  for (pass = 0; pass < 2; ++pass) {
+    STATUS(IINE_OK, iine_estimator_set_crease_windows(e, pass));
+    STATUS(IINE_OK, iine_estimator_compute(e, &points, &normals));
+    for (i = 0; i < PIXELS; ++i) {
+      const int column = i % WIDTH - WIDTH / 2;
+      const float off = fabsf(fabsf(normals_out[4 * i]) - sqrtf(0.5f));
+      if (column != 0 && !(off <= worst[pass])) {
+        worst[pass] = off;
+      }
+    }
+  }
+  CHECK(worst[0] > 0.3f);
+  CHECK(worst[1] < 0.05f);
+  iine_estimator_free(e);
+}
+
 /* The smallest clouds: no window fits, so no normal, and no fault. */
 static void test_small_clouds(void) {
   iine_estimator *const e = new_estimator();
@@ -702,9 +992,10 @@ static void test_small_clouds(void) {
 int main(void) {
   void (*const tests[])(void) = {
       test_version,  test_isa_name,   test_status_strings,
-      test_new_and_free,    test_options, test_refused_options_change_nothing,
+      test_new_and_free,    test_options, test_paper_options, test_refused_options_change_nothing,
       test_compute,  test_layouts,    test_threads_do_not_change_the_result,
       test_compute_refuses, test_indices, test_window, test_maps,
+      test_paper, test_crease_windows,
       test_scratch,  test_small_clouds};
   size_t i;
   for (i = 0; i < sizeof tests / sizeof *tests; ++i) {

@@ -2,8 +2,11 @@
 
 mod clouds;
 
-use clouds::{Cloud, Kind, angle, assert_same_bits, compute, fast_isas, methods, normal, options};
-use iine::{Estimator, Isa, Method, Normals, Points};
+use clouds::{
+    Cloud, Kind, angle, assert_same_bits, compute, fast_isas, methods, normal, options,
+    paper_options,
+};
+use iine::{Estimator, Isa, Method, Normals, Options, Points, Semantics};
 
 const SMOOTHING: [f32; 6] = [3.0, 5.0, 7.0, 10.0, 20.0, 40.0];
 
@@ -17,10 +20,11 @@ struct Worst {
 
 /// Degrees that a normal may differ from the plain form's: in AVERAGE_3D_GRADIENT and SIMPLE_3D_GRADIENT by the
 /// rounding to integers (`strips.rs` asks the plain form where that could turn a normal by 1e-4), in
-/// AVERAGE_DEPTH_CHANGE by floats (likewise), in COVARIANCE_MATRIX by a hundredth of that.
-fn allowed(method: Method) -> f64 {
-    match method {
+/// AVERAGE_DEPTH_CHANGE by floats (likewise), in COVARIANCE_MATRIX and the paper's methods by a hundredth of that.
+fn allowed(options: &Options) -> f64 {
+    match options.method {
         Method::CovarianceMatrix => 1e-3,
+        _ if options.semantics == Semantics::Paper => 1e-3,
         _ => 6e-3,
     }
 }
@@ -62,7 +66,7 @@ impl Worst {
                 }
                 let worst = &mut self.angle[options.method as usize];
                 *worst = worst.max(degrees);
-                assert!(degrees <= allowed(options.method), "{degrees} deg, {}", place());
+                assert!(degrees <= allowed(options), "{degrees} deg, {}", place());
             }
             if !fast[3].is_nan() {
                 let difference = (fast[3] - plain[3]).abs();
@@ -118,6 +122,35 @@ fn every_kind_equals_the_plain_form() {
     println!("{worst:?}");
 }
 
+#[test]
+fn the_papers_windows_equal_the_plain_form() {
+    let mut worst = Worst::default();
+    let mut kinds = Kind::ALL.into_iter().cycle();
+    let settings = paper_options();
+    let mut settings = settings.iter().cycle();
+    for width in (1..=40).chain([63, 64, 65, 130]) {
+        for height in [1, 2, 3, 5, 8, 13, 24, 41] {
+            let seed = (100 * width + height) as u64;
+            let kind = kinds.next().expect("without end");
+            let cloud = Cloud::new(kind, width, height, seed);
+            for options in settings.by_ref().take(if width * height > 250 { 1 } else { 4 }) {
+                worst.check(&cloud, &format!("{kind:?} {width}x{height} seed {seed}"), options);
+            }
+        }
+    }
+    for (seed, kind) in (0..).zip(Kind::ALL) {
+        let cloud = Cloud::new(kind, 77, 53, seed);
+        for options in paper_options() {
+            worst.check(&cloud, &format!("{kind:?}"), &options);
+        }
+    }
+    let cloud = Cloud::new(Kind::NanBlocks, 640, 300, 3);
+    for options in paper_options().iter().step_by(5) {
+        worst.check(&cloud, "several tiles", options);
+    }
+    println!("{worst:?}");
+}
+
 /// Several tiles and many groups a row.
 #[test]
 fn wide_clouds_equal_the_plain_form() {
@@ -150,8 +183,8 @@ fn laid_out(cloud: &Cloud, stride: usize, row: usize) -> Vec<f32> {
 fn layouts_of_points_do_not_matter() {
     for (width, height) in [(67, 29), (16, 9), (3, 3)] {
         let cloud = Cloud::new(Kind::NanBlocks, width, height, 5);
-        for method in methods() {
-            let options = options(method, 5.0, true);
+        let all = methods().map(|method| options(method, 5.0, true)).chain(paper_options());
+        for options in all {
             for isa in fast_isas().chain([Isa::Scalar]) {
                 let mut estimator = Estimator::with_isa(options.clone(), isa);
                 let expected = compute(&mut estimator, &cloud);

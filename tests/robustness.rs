@@ -3,7 +3,9 @@
 mod clouds;
 
 use clouds::{Cloud, Kind, Random, compute, fast_isas};
-use iine::{BorderPolicy, Estimator, Isa, Method, Normals, Options};
+use iine::{
+    BorderPolicy, Depth, DistanceMetric, Estimator, Isa, Maps, Method, Normals, Options, Semantics,
+};
 
 const VALUES: [f32; 18] = [
     f32::NAN,
@@ -131,6 +133,127 @@ fn nothing_panics() {
     }
     println!("{clouds} clouds");
     assert_eq!(differing, 0);
+}
+
+/// The options that PCL does not have; without any of them about every 20th time.
+fn random_options_beyond_pcl(random: &mut Random) -> Options {
+    let mut options = random_options(random);
+    if options.normal_smoothing_size > 64.0 {
+        options.normal_smoothing_size = 12.0;
+    }
+    options.semantics = random.pick(&Semantics::ALL);
+    let parameter = |random: &mut Random, default: f32| {
+        default * random.pick(&[1.0, 1.0, 1.0, 0.3, 3.0, 1e-6, 1e6, 1e-38, 1e35])
+    };
+    let paper = &mut options.paper;
+    paper.alpha = parameter(random, paper.alpha);
+    paper.beta = parameter(random, paper.beta);
+    paper.gamma = parameter(random, paper.gamma);
+    let mut radii = [(); 3].map(|()| 1 + random.below(9) as u32);
+    radii.sort();
+    [paper.smallest_radius, paper.least_depth_radius, paper.largest_radius] = radii;
+    paper.distance_metric = random.pick(&DistanceMetric::ALL);
+    paper.depth = random.pick(&Depth::ALL);
+    [options.zero_is_missing, options.one_sided_windows, options.crease_windows] =
+        [(); 3].map(|()| random.below(2) == 0);
+    options
+}
+
+#[test]
+fn nothing_panics_beyond_pcl() {
+    let mut random = Random::new(22);
+    let (mut clouds, mut with_normal) = (0, 0);
+    for seed in 0..6_000 {
+        let cloud = random_cloud(&mut random, seed);
+        let options = random_options_beyond_pcl(&mut random);
+        if options.check().is_err() {
+            continue;
+        }
+        clouds += 1;
+        let mut estimator = Estimator::new(options.clone());
+        let found = compute(&mut estimator, &cloud);
+        let what = |at: usize| {
+            let (x, y) = (at % cloud.width, at / cloud.width);
+            format!("seed {seed} pixel {x},{y}: {:?}; {options:?}", found[at])
+        };
+        let is_paper = options.semantics == Semantics::Paper;
+        // PCL's AVERAGE_DEPTH_CHANGE overflows in floats, and has no length then.
+        let overflows = !is_paper && options.method == Method::AverageDepthChange;
+        for (at, normal) in found.iter().enumerate().filter(|_| !overflows) {
+            let is_missing = cloud.points[at].iter().any(|c| !c.is_finite())
+                || options.zero_is_missing && cloud.points[at] == [0.0; 3];
+            let length = normal[..3].iter().map(|c| c * c).sum::<f32>().sqrt();
+            if length.is_nan() {
+                assert!(normal[..3].iter().all(|c| c.is_nan()), "{}", what(at));
+                continue;
+            }
+            with_normal += 1;
+            assert!(!(is_missing && is_paper), "a missing point: {}", what(at));
+            assert!((length - 1.0).abs() < 1e-4, "length {length}: {}", what(at));
+            let has_curvature = options.method == Method::CovarianceMatrix;
+            assert_eq!(normal[3].is_nan(), !has_curvature, "{}", what(at));
+        }
+
+        let index = random.below(cloud.points.len());
+        let mut one = [7.0; 4];
+        let mut normal = Normals::interleaved(&mut one, 1, 1, 4, 0, Some(3)).unwrap();
+        estimator.compute_indices(&cloud.view(), &[index as i32], &mut normal).unwrap();
+        assert_eq!(one.map(f32::to_bits), found[index].map(f32::to_bits), "{}", what(index));
+        let mut normal = Normals::interleaved(&mut one, 1, 1, 4, 0, Some(3)).unwrap();
+        let pixel = (index % cloud.width, index / cloud.width);
+        let size = (random.below(30) as u32, random.below(30) as u32);
+        estimator.compute_window(&cloud.view(), pixel, size, &mut normal).unwrap();
+
+        let mut areas = vec![-1.0; cloud.points.len()];
+        let mut maps = Maps { smoothing_areas: Some(&mut areas), ..Maps::default() };
+        estimator.compute_maps(&cloud.view(), &mut maps).unwrap();
+        let largest = options.paper.largest_radius as f32;
+        assert!(areas.iter().all(|area| *area >= 0.0 && (*area <= largest || !is_paper)));
+        let is_base = !options.one_sided_windows;
+        for at in (0..found.len()).filter(|at| is_base && areas[*at] == 0.0) {
+            assert!(found[at][0].is_nan(), "no window: {}", what(at));
+        }
+    }
+    println!("{clouds} clouds, {with_normal} normals");
+    assert!(with_normal > 100_000);
+}
+
+#[test]
+fn parameters_that_are_none_are_refused() {
+    type Change = fn(&mut Options, f32);
+    let changes: [Change; 3] = [
+        |options, value| options.paper.alpha = value,
+        |options, value| options.paper.beta = value,
+        |options, value| options.paper.gamma = value,
+    ];
+    let cloud = Cloud::new(Kind::Wavy, 9, 9, 1);
+    let refused = |options: Options| {
+        let mut found = [7.0; 3 * 81];
+        let mut normals = Normals::interleaved(&mut found, 9, 9, 3, 0, None).unwrap();
+        let outcome = Estimator::new(options).compute(&cloud.view(), &mut normals);
+        assert!(outcome.is_ok() || found == [7.0; 3 * 81], "outputs stay untouched");
+        outcome == Err(iine::Error::OptionValue)
+    };
+    let mut paper = Options::default();
+    paper.semantics = Semantics::Paper;
+    let mut creases = Options::default();
+    creases.crease_windows = true;
+    for options in [paper.clone(), creases] {
+        assert!(!refused(options.clone()));
+        for change in changes {
+            for value in [0.0, -0.0, -3.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+                let mut options = options.clone();
+                change(&mut options, value);
+                assert!(refused(options));
+            }
+        }
+        for radii in [[0, 5, 20], [6, 5, 20], [2, 21, 20], [2, 5, 1001]] {
+            let mut options = options.clone();
+            let paper = &mut options.paper;
+            [paper.smallest_radius, paper.least_depth_radius, paper.largest_radius] = radii;
+            assert!(refused(options));
+        }
+    }
 }
 
 #[test]

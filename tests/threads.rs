@@ -6,7 +6,9 @@ mod clouds;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use clouds::{Cloud, Kind, Random, assert_same_bits, compute, fast_isas, methods, options};
+use clouds::{
+    Cloud, Kind, Random, assert_same_bits, compute, fast_isas, methods, options, paper_options,
+};
 use iine::{BorderPolicy, Estimator, Isa, Method, Normals};
 
 thread_local! {
@@ -43,19 +45,20 @@ fn the_number_of_threads_does_not_matter() {
         (Kind::Wavy, 35, 400),
     ] {
         let cloud = Cloud::new(kind, width, height, 11);
+        let mut all = paper_options();
         for method in methods() {
             for depth_dependent in [false, true] {
-                for smoothing in [5.0, 10.0, 20.0] {
-                    let mut options = options(method, smoothing, depth_dependent);
-                    options.threads = 1;
-                    let one = compute(&mut Estimator::new(options.clone()), &cloud);
-                    for threads in [2, 3, 7] {
-                        options.threads = threads;
-                        let found = compute(&mut Estimator::new(options.clone()), &cloud);
-                        let what = format!("{kind:?} {options:?}");
-                        assert_same_bits(&found, &one, width, &what);
-                    }
-                }
+                all.extend([5.0, 10.0, 20.0].map(|size| options(method, size, depth_dependent)));
+            }
+        }
+        for mut options in all {
+            options.threads = 1;
+            let one = compute(&mut Estimator::new(options.clone()), &cloud);
+            for threads in [2, 3, 7] {
+                options.threads = threads;
+                let found = compute(&mut Estimator::new(options.clone()), &cloud);
+                let what = format!("{kind:?} {options:?}");
+                assert_same_bits(&found, &one, width, &what);
             }
         }
     }
@@ -87,10 +90,10 @@ fn listed_pixels_get_what_the_whole_cloud_gives_them() {
             (0..pixels).map(|_| permuted[random.below(pixels.min(40))]).collect();
         let one = vec![permuted[0]];
         let last = vec![pixels as i32 - 1, 0, pixels as i32 - 1];
-        for method in methods() {
+        let all = methods().map(|method| options(method, 7.0, true)).chain(paper_options());
+        for mut options in all {
             for isa in fast_isas().chain([Isa::Scalar]) {
                 for threads in [1, 3] {
-                    let mut options = options(method, 7.0, true);
                     options.threads = threads;
                     let mut estimator = Estimator::with_isa(options.clone(), isa);
                     let all = compute(&mut estimator, &cloud);
@@ -113,12 +116,17 @@ fn listed_pixels_get_what_the_whole_cloud_gives_them() {
 fn frames_before_do_not_matter() {
     let mut random = Random::new(14);
     let combinations: Vec<_> = methods().collect();
+    let papers = paper_options();
     let mut reused = Estimator::new(options(combinations[0], 10.0, false));
     for seed in 0..150 {
         let (width, height) = (1 + random.below(300), 1 + random.below(120));
         let cloud = Cloud::new(random.pick(&Kind::ALL), width, height, seed);
         let smoothing = random.pick(&[3.0, 8.0, 15.0]);
-        let mut options = options(random.pick(&combinations), smoothing, seed % 2 == 0);
+        let mut options = if seed % 3 == 0 {
+            papers[random.below(papers.len())].clone()
+        } else {
+            options(random.pick(&combinations), smoothing, seed % 2 == 0)
+        };
         options.threads = random.pick(&[1, 1, 2]);
         *reused.options_mut() = options.clone();
         let found = compute(&mut reused, &cloud);

@@ -56,7 +56,7 @@
 #define IINE_ERROR_OPTION_VALUE 7
 
 /**
- * The method does not support the border policy.
+ * Options or maps that do not go together: the functions say which.
  */
 #define IINE_ERROR_UNSUPPORTED 8
 
@@ -96,7 +96,8 @@
 #define IINE_METHOD_AVERAGE_DEPTH_CHANGE 2
 
 /**
- * Cross product of the differences of the window's outermost strips; not with IINE_BORDER_POLICY_MIRROR.
+ * Cross product of the differences of the window's outermost strips; not with IINE_BORDER_POLICY_MIRROR, nor with
+ * IINE_SEMANTICS_PAPER.
  */
 #define IINE_METHOD_SIMPLE_3D_GRADIENT 3
 
@@ -109,6 +110,37 @@
  * Windows are folded back at the border of the image.
  */
 #define IINE_BORDER_POLICY_MIRROR 1
+
+/**
+ * PCL's class, step by step; pixels get the answers that PCL gives (the default).
+ */
+#define IINE_SEMANTICS_PCL 0
+
+/**
+ * The paper as published: windows by its smoothing area map, clipped at the border of the image, and sums over the
+ * finite points in them.
+ */
+#define IINE_SEMANTICS_PAPER 1
+
+/**
+ * Exact Euclidean distance (the default).
+ */
+#define IINE_DISTANCE_METRIC_EUCLIDEAN 0
+
+/**
+ * Borgefors' 3-4 chamfer distance, divided by 3: at most 8 % off.
+ */
+#define IINE_DISTANCE_METRIC_CHAMFER 1
+
+/**
+ * Depth is z, for cameras (the default).
+ */
+#define IINE_DEPTH_Z 0
+
+/**
+ * Depth is the distance from the origin, for spinning LiDARs.
+ */
+#define IINE_DEPTH_RANGE 1
 
 /**
  * The version of this header: major part.
@@ -223,7 +255,8 @@ typedef struct iine_normals {
 } iine_normals;
 
 /**
- * Where the maps behind the normals are written: each a packed array of width * height, or NULL for none.
+ * Where the maps behind the normals are written: each a packed array of width * height elements unless it says
+ * otherwise, or NULL for none.
  */
 typedef struct iine_maps {
   /**
@@ -239,10 +272,24 @@ typedef struct iine_maps {
    */
   float *distances;
   /**
-   * Smoothing area map (the paper's R): the side of the pixel's window in pixels, 0 where there is none.
+   * Smoothing area map: the side of the pixel's window in pixels, or with IINE_SEMANTICS_PAPER its radius R
+   * (Eq. 8); 0 where there is none.
    */
   float *smoothing_areas;
+  /**
+   * Radius that the depth asks for (the paper's B, Eq. 5), within its limits, in pixels; NaN at missing points.
+   * Only with IINE_SEMANTICS_PAPER.
+   */
+  float *depth_radii;
+  /**
+   * Eigenvalues of the covariance matrix (Eq. 16) of the finite points in every pixel's window, in the cloud's unit
+   * squared: three for every pixel, ascending, so 3 * width * height elements; NaN where there is no window.
+   * Only with IINE_METHOD_COVARIANCE_MATRIX.
+   */
+  float *eigenvalues;
 } iine_maps;
+
+
 
 
 
@@ -279,6 +326,102 @@ int32_t iine_estimator_new(struct iine_estimator **estimator);
  * `estimator` is NULL, or came from `iine_estimator_new` and was not freed.
  */
 void iine_estimator_free(struct iine_estimator *estimator);
+
+/**
+ * Computes the normal of every pixel of `points` into `normals`.
+ *
+ * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_STRUCT_SIZE, IINE_ERROR_SIZE, IINE_ERROR_STRIDE,
+ * IINE_ERROR_MISALIGNED, IINE_ERROR_OVERLAP, IINE_ERROR_UNSUPPORTED, IINE_ERROR_OUT_OF_MEMORY,
+ * IINE_ERROR_THREADS. Nothing is written then. IINE_ERROR_UNSUPPORTED is for IINE_METHOD_SIMPLE_3D_GRADIENT with
+ * IINE_BORDER_POLICY_MIRROR or IINE_SEMANTICS_PAPER.
+ *
+ * # Safety
+ * The pointers are NULL or valid as their structs say, for the whole call; no other thread uses `estimator` or
+ * writes to the points or accesses the normals meanwhile.
+ */
+int32_t iine_estimator_compute(struct iine_estimator *estimator,
+                               const struct iine_points *points,
+                               const struct iine_normals *normals);
+
+/**
+ * Computes the normals of the pixels that `indices` lists (row * width + column, any order, repeats allowed):
+ * element k of `normals`, `normals->point_stride` bytes after element k - 1, belongs to indices[k] and equals
+ * what `iine_estimator_compute` gives for that pixel. A `count` of 0 does nothing.
+ *
+ * Errors: as `iine_estimator_compute`, and IINE_ERROR_INDEX if an index is outside the cloud. Nothing is
+ * written then.
+ *
+ * # Safety
+ * As `iine_estimator_compute`; `indices` is NULL or valid for `count` reads.
+ */
+int32_t iine_estimator_compute_indices(struct iine_estimator *estimator,
+                                       const struct iine_points *points,
+                                       const int32_t *indices,
+                                       size_t count,
+                                       const struct iine_normals *normals);
+
+/**
+ * Computes the normal of pixel (`x`, `y`) from the window of `rect_width` x `rect_height` pixels around it,
+ * whatever the depth changes, the smoothing size and the ignored border say, into the first element of `normal`
+ * (as PCL's `computePointNormal` after `setRectSize`).
+ *
+ * The window starts at (x - rect_width / 2, y - rect_height / 2). What lies outside the image is left out with
+ * IINE_BORDER_POLICY_IGNORE and folded back with IINE_BORDER_POLICY_MIRROR. Where the window gives no normal, and
+ * a size of 0 never does, NaN is written. Takes time proportional to the window's area, but with
+ * IINE_SEMANTICS_PAPER (where the border policy has no effect) or missing zeros to the cloud's.
+ *
+ * Errors: as `iine_estimator_compute`, IINE_ERROR_INDEX if the pixel is outside the cloud, and
+ * IINE_ERROR_OPTION_VALUE if a size is negative. Nothing is written then.
+ *
+ * # Safety
+ * As `iine_estimator_compute`.
+ */
+int32_t iine_estimator_compute_window(struct iine_estimator *estimator,
+                                      const struct iine_points *points,
+                                      uint32_t x,
+                                      uint32_t y,
+                                      int32_t rect_width,
+                                      int32_t rect_height,
+                                      const struct iine_normals *normal);
+
+/**
+ * Computes the maps behind the normals: those whose pointers in `maps` are not NULL.
+ *
+ * A map must overlap neither another map nor the range of bytes from a coordinate's first pixel to its last. They are those of the smoothing area map's own windows, whatever one-sided windows and crease windows make of
+ * them.
+ *
+ * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_STRUCT_SIZE, IINE_ERROR_SIZE, IINE_ERROR_STRIDE,
+ * IINE_ERROR_MISALIGNED, IINE_ERROR_OVERLAP, IINE_ERROR_OUT_OF_MEMORY; IINE_ERROR_UNSUPPORTED for depth radii
+ * without IINE_SEMANTICS_PAPER, eigenvalues without IINE_METHOD_COVARIANCE_MATRIX, and as
+ * `iine_estimator_compute`. Nothing is written then.
+ *
+ * # Safety
+ * The pointers are NULL or valid as their structs say, for the whole call; each map is valid for as many writes as
+ * it has elements; no other thread uses `estimator` meanwhile.
+ */
+int32_t iine_estimator_compute_maps(struct iine_estimator *estimator,
+                                    const struct iine_points *points,
+                                    const struct iine_maps *maps);
+
+/**
+ * Writes to `*bytes` how much scratch memory the estimator holds, in bytes.
+ *
+ * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_MISALIGNED.
+ *
+ * # Safety
+ * `estimator` is NULL or a live estimator that no other thread changes; `bytes` is NULL or valid for a write.
+ */
+int32_t iine_estimator_scratch_size(const struct iine_estimator *estimator, size_t *bytes);
+
+/**
+ * Frees the estimator's scratch memory and worker threads; the next computation makes them anew.
+ *
+ * Errors: IINE_ERROR_NULL_POINTER.
+ *
+ * # Safety
+ * `estimator` is NULL or a live estimator that no other thread uses.
+ */
+int32_t iine_estimator_release_scratch(struct iine_estimator *estimator);
 
 /**
  * Sets the method: one of IINE_METHOD_*; default IINE_METHOD_AVERAGE_3D_GRADIENT.
@@ -358,95 +501,140 @@ int32_t iine_estimator_set_threads(struct iine_estimator *estimator,
                                    uint32_t threads);
 
 /**
- * Computes the normal of every pixel of `points` into `normals`.
+ * Sets whose definition of the windows and sums is followed: one of IINE_SEMANTICS_*; default IINE_SEMANTICS_PCL.
  *
- * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_STRUCT_SIZE, IINE_ERROR_SIZE, IINE_ERROR_STRIDE,
- * IINE_ERROR_MISALIGNED, IINE_ERROR_OVERLAP, IINE_ERROR_UNSUPPORTED, IINE_ERROR_OUT_OF_MEMORY,
- * IINE_ERROR_THREADS. Nothing is written then.
+ * With IINE_SEMANTICS_PAPER the border policy, the smoothing size, depth dependent smoothing and the depth change
+ * factor have no effect, and IINE_METHOD_SIMPLE_3D_GRADIENT is not supported; the iine_estimator_set_paper_*
+ * functions set what takes their place.
  *
- * # Safety
- * The pointers are NULL or valid as their structs say, for the whole call; no other thread uses `estimator` or
- * writes to the points or accesses the normals meanwhile.
- */
-int32_t iine_estimator_compute(struct iine_estimator *estimator,
-                               const struct iine_points *points,
-                               const struct iine_normals *normals);
-
-/**
- * Computes the normals of the pixels that `indices` lists (row * width + column, any order, repeats allowed):
- * element k of `normals`, `normals->point_stride` bytes after element k - 1, belongs to indices[k] and equals
- * what `iine_estimator_compute` gives for that pixel. A `count` of 0 does nothing.
- *
- * Errors: as `iine_estimator_compute`, and IINE_ERROR_INDEX if an index is outside the cloud. Nothing is
- * written then.
- *
- * # Safety
- * As `iine_estimator_compute`; `indices` is NULL or valid for `count` reads.
- */
-int32_t iine_estimator_compute_indices(struct iine_estimator *estimator,
-                                       const struct iine_points *points,
-                                       const int32_t *indices,
-                                       size_t count,
-                                       const struct iine_normals *normals);
-
-/**
- * Computes the normal of pixel (`x`, `y`) from the window of `rect_width` x `rect_height` pixels around it,
- * whatever the depth changes, the smoothing size and the ignored border say, into the first element of `normal`
- * (as PCL's `computePointNormal` after `setRectSize`).
- *
- * The window starts at (x - rect_width / 2, y - rect_height / 2). What lies outside the image is left out with
- * IINE_BORDER_POLICY_IGNORE and folded back with IINE_BORDER_POLICY_MIRROR. Where the window gives no normal, and
- * a size of 0 never does, NaN is written. Takes time proportional to the window's area.
- *
- * Errors: as `iine_estimator_compute`, IINE_ERROR_INDEX if the pixel is outside the cloud, and
- * IINE_ERROR_OPTION_VALUE if a size is negative. Nothing is written then.
- *
- * # Safety
- * As `iine_estimator_compute`.
- */
-int32_t iine_estimator_compute_window(struct iine_estimator *estimator,
-                                      const struct iine_points *points,
-                                      uint32_t x,
-                                      uint32_t y,
-                                      int32_t rect_width,
-                                      int32_t rect_height,
-                                      const struct iine_normals *normal);
-
-/**
- * Computes the maps behind the normals: those whose pointers in `maps` are not NULL.
- *
- * A map must overlap neither another map nor the range of bytes from a coordinate's first pixel to its last.
- *
- * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_STRUCT_SIZE, IINE_ERROR_SIZE, IINE_ERROR_STRIDE,
- * IINE_ERROR_MISALIGNED, IINE_ERROR_OVERLAP, IINE_ERROR_OUT_OF_MEMORY. Nothing is written then.
- *
- * # Safety
- * The pointers are NULL or valid as their structs say, for the whole call; each map is valid for width * height
- * writes; no other thread uses `estimator` meanwhile.
- */
-int32_t iine_estimator_compute_maps(struct iine_estimator *estimator,
-                                    const struct iine_points *points,
-                                    const struct iine_maps *maps);
-
-/**
- * Writes to `*bytes` how much scratch memory the estimator holds, in bytes.
- *
- * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_MISALIGNED.
- *
- * # Safety
- * `estimator` is NULL or a live estimator that no other thread changes; `bytes` is NULL or valid for a write.
- */
-int32_t iine_estimator_scratch_size(const struct iine_estimator *estimator, size_t *bytes);
-
-/**
- * Frees the estimator's scratch memory and worker threads; the next computation makes them anew.
- *
- * Errors: IINE_ERROR_NULL_POINTER.
+ * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
  *
  * # Safety
  * `estimator` is NULL or a live estimator that no other thread uses.
  */
-int32_t iine_estimator_release_scratch(struct iine_estimator *estimator);
+int32_t iine_estimator_set_semantics(struct iine_estimator *estimator,
+                                     int32_t semantics);
+
+/**
+ * Sets alpha: the smallest depth change that the sensor can tell at depth d is alpha d^2 (Eq. 4). In 1/unit of
+ * length; finite, above 0; default 0.0028, the paper's for a Kinect and metres. See `iine_alpha_of_sensor`.
+ *
+ * Used by IINE_SEMANTICS_PAPER and by crease windows.
+ *
+ * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+ *
+ * # Safety
+ * `estimator` is NULL or a live estimator that no other thread uses.
+ */
+int32_t iine_estimator_set_paper_alpha(struct iine_estimator *estimator,
+                                       float alpha);
+
+/**
+ * Sets beta: the radius of the window in pixels is beta alpha d^2 (Eq. 5). In pixels/unit of length; finite,
+ * above 0; default 800: with the default alpha 5 px at 1.5 m, 9 px at 2 m.
+ *
+ * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+ *
+ * # Safety
+ * `estimator` is NULL or a live estimator that no other thread uses.
+ */
+int32_t iine_estimator_set_paper_beta(struct iine_estimator *estimator, float beta);
+
+/**
+ * Sets gamma: neighbours whose depths differ by gamma alpha d^2 or more are a depth change apart (Eq. 6). Without
+ * unit; finite, above 0; default 5.
+ *
+ * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+ *
+ * # Safety
+ * `estimator` is NULL or a live estimator that no other thread uses.
+ */
+int32_t iine_estimator_set_paper_gamma(struct iine_estimator *estimator,
+                                       float gamma);
+
+/**
+ * Sets the limits of the window's radius, in pixels: where it is below `smallest` there is no window; what the
+ * depth asks for (Eq. 5) is at least `least_depth` and at most `largest`.
+ *
+ * 1 <= smallest <= least_depth <= largest <= 1000; default 2, 5, 20.
+ *
+ * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+ *
+ * # Safety
+ * `estimator` is NULL or a live estimator that no other thread uses.
+ */
+int32_t iine_estimator_set_paper_radii(struct iine_estimator *estimator,
+                                       uint32_t smallest,
+                                       uint32_t least_depth,
+                                       uint32_t largest);
+
+/**
+ * Sets how the distance to the nearest depth change is measured with IINE_SEMANTICS_PAPER: one of
+ * IINE_DISTANCE_METRIC_*; default IINE_DISTANCE_METRIC_EUCLIDEAN.
+ *
+ * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+ *
+ * # Safety
+ * `estimator` is NULL or a live estimator that no other thread uses.
+ */
+int32_t iine_estimator_set_paper_distance_metric(struct iine_estimator *estimator, int32_t distance_metric);
+
+/**
+ * Sets what a point's depth is with IINE_SEMANTICS_PAPER: one of IINE_DEPTH_*; default IINE_DEPTH_Z.
+ *
+ * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+ *
+ * # Safety
+ * `estimator` is NULL or a live estimator that no other thread uses.
+ */
+int32_t iine_estimator_set_paper_depth(struct iine_estimator *estimator, int32_t depth);
+
+/**
+ * Whether points at (0, 0, 0) are missing, as LiDARs and some depth cameras write them: 0 (the default) or 1.
+ *
+ * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
+ *
+ * # Safety
+ * `estimator` is NULL or a live estimator that no other thread uses.
+ */
+int32_t iine_estimator_set_zero_is_missing(struct iine_estimator *estimator, int32_t zero_is_missing);
+
+/**
+ * Whether pixels near a depth change get a window of their own side, and with it a normal every pixel that has
+ * two neighbours on its surface not in line with it: 0 (the default) or 1. With either semantics.
+ *
+ * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
+ *
+ * # Safety
+ * `estimator` is NULL or a live estimator that no other thread uses.
+ */
+int32_t iine_estimator_set_one_sided_windows(struct iine_estimator *estimator,
+                                             int32_t one_sided_windows);
+
+/**
+ * Whether a second pass moves windows off the places where the normals of the first vary strongly, so that edges
+ * without a depth change stay sharp: 0 (the default) or 1. With either semantics; takes the sensor's alpha from
+ * `iine_estimator_set_paper_alpha`.
+ *
+ * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
+ *
+ * # Safety
+ * `estimator` is NULL or a live estimator that no other thread uses.
+ */
+int32_t iine_estimator_set_crease_windows(struct iine_estimator *estimator,
+                                          int32_t crease_windows);
+
+/**
+ * The alpha of a stereo or structured light sensor: disparity_step / (focal * baseline), as its depth is
+ * focal * baseline / disparity.
+ *
+ * `disparity_step` and `focal` in pixels, `baseline` in the cloud's unit of length; all finite and above 0, else
+ * the result is a number that `iine_estimator_set_paper_alpha` may refuse. A Kinect's 1/8 px, 580 px and 0.075 m
+ * give 0.0029.
+ */
+float iine_alpha_of_sensor(float disparity_step,
+                           float focal,
+                           float baseline);
 
 /**
  * The text of a status: static, never NULL, for any number.

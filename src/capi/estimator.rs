@@ -2,14 +2,14 @@
 
 use super::boundary::{check_writable, guard, read_sized, reference, reference_mut, write};
 use super::types::{iine_maps, iine_normals, iine_points};
-use crate::{BorderPolicy, Error, Estimator, Maps, Method, Normals, Options, Points};
+use crate::{Error, Estimator, Maps, Normals, Options, Points};
 
 /// Estimates normals. Owns its options and its scratch memory, which is reused from frame to frame.
 ///
 /// One estimator is used by one thread at a time; different estimators freely.
 #[allow(non_camel_case_types)]
 pub struct iine_estimator {
-    estimator: Estimator,
+    pub(super) estimator: Estimator,
 }
 
 /// Makes an estimator with the default options and writes it to `*estimator`.
@@ -41,170 +41,6 @@ pub unsafe extern "C" fn iine_estimator_free(estimator: *mut iine_estimator) {
         }
         Ok(())
     });
-}
-
-/// Changes one option, after `change` has said that its value is in range.
-///
-/// # Safety
-/// `estimator` is NULL or a live estimator that no other thread uses.
-unsafe fn set(
-    estimator: *mut iine_estimator,
-    change: impl FnOnce(&mut Options) -> Result<(), Error>,
-) -> i32 {
-    guard(|| {
-        // SAFETY: promised by the caller.
-        change(unsafe { reference_mut(estimator) }?.estimator.options_mut())
-    })
-}
-
-/// Sets the method: one of IINE_METHOD_*; default IINE_METHOD_AVERAGE_3D_GRADIENT.
-///
-/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
-///
-/// # Safety
-/// `estimator` is NULL or a live estimator that no other thread uses.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn iine_estimator_set_method(
-    estimator: *mut iine_estimator,
-    method: i32,
-) -> i32 {
-    let change = |options: &mut Options| {
-        let known = Method::ALL.into_iter().find(|known| *known as i32 == method);
-        options.method = known.ok_or(Error::OptionValue)?;
-        Ok(())
-    };
-    // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
-}
-
-/// Sets the border policy: one of IINE_BORDER_POLICY_*; default IINE_BORDER_POLICY_IGNORE.
-///
-/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
-///
-/// # Safety
-/// `estimator` is NULL or a live estimator that no other thread uses.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn iine_estimator_set_border_policy(
-    estimator: *mut iine_estimator,
-    border_policy: i32,
-) -> i32 {
-    let change = |options: &mut Options| {
-        let known = BorderPolicy::ALL.into_iter().find(|known| *known as i32 == border_policy);
-        options.border_policy = known.ok_or(Error::OptionValue)?;
-        Ok(())
-    };
-    // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
-}
-
-/// Sets the smoothing size in pixels, the side of the largest window: finite, above 0; default 10.
-///
-/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
-///
-/// # Safety
-/// `estimator` is NULL or a live estimator that no other thread uses.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn iine_estimator_set_normal_smoothing_size(
-    estimator: *mut iine_estimator,
-    normal_smoothing_size: f32,
-) -> i32 {
-    let change = |options: &mut Options| {
-        if !(normal_smoothing_size.is_finite() && normal_smoothing_size > 0.0) {
-            return Err(Error::OptionValue);
-        }
-        options.normal_smoothing_size = normal_smoothing_size;
-        Ok(())
-    };
-    // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
-}
-
-/// Whether a tenth of a pixel's z (signed, in the cloud's unit) is added to its smoothing size: 0 (the default)
-/// or 1.
-///
-/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
-///
-/// # Safety
-/// `estimator` is NULL or a live estimator that no other thread uses.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn iine_estimator_set_depth_dependent_smoothing(
-    estimator: *mut iine_estimator,
-    depth_dependent_smoothing: i32,
-) -> i32 {
-    let change = |options: &mut Options| {
-        options.depth_dependent_smoothing = match depth_dependent_smoothing {
-            0 => false,
-            1 => true,
-            _ => return Err(Error::OptionValue),
-        };
-        Ok(())
-    };
-    // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
-}
-
-/// Sets the factor of the depth change threshold: two neighbours are a depth change apart if their z differ by
-/// more than 2 * factor * (|z| + 1), in the cloud's unit. Any number; default 0.02.
-///
-/// Errors: IINE_ERROR_NULL_POINTER.
-///
-/// # Safety
-/// `estimator` is NULL or a live estimator that no other thread uses.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn iine_estimator_set_max_depth_change_factor(
-    estimator: *mut iine_estimator,
-    max_depth_change_factor: f32,
-) -> i32 {
-    let change = |options: &mut Options| {
-        options.max_depth_change_factor = max_depth_change_factor;
-        Ok(())
-    };
-    // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
-}
-
-/// Sets the point that normals are turned towards, in the cloud's coordinates. Any numbers; default (0, 0, 0).
-///
-/// Errors: IINE_ERROR_NULL_POINTER.
-///
-/// # Safety
-/// `estimator` is NULL or a live estimator that no other thread uses.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn iine_estimator_set_viewpoint(
-    estimator: *mut iine_estimator,
-    x: f32,
-    y: f32,
-    z: f32,
-) -> i32 {
-    let change = |options: &mut Options| {
-        options.viewpoint = [x, y, z];
-        Ok(())
-    };
-    // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
-}
-
-/// Sets the number of threads: 1 (the default) computes on the calling thread, 0 takes one per core. The result
-/// does not depend on it, bit for bit.
-///
-/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE above 1024.
-///
-/// # Safety
-/// `estimator` is NULL or a live estimator that no other thread uses.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn iine_estimator_set_threads(
-    estimator: *mut iine_estimator,
-    threads: u32,
-) -> i32 {
-    let change = |options: &mut Options| {
-        if threads > 1024 {
-            return Err(Error::OptionValue);
-        }
-        options.threads = threads as usize;
-        Ok(())
-    };
-    // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
 }
 
 /// # Safety
@@ -240,7 +76,8 @@ unsafe fn read_normals<'a>(
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_STRUCT_SIZE, IINE_ERROR_SIZE, IINE_ERROR_STRIDE,
 /// IINE_ERROR_MISALIGNED, IINE_ERROR_OVERLAP, IINE_ERROR_UNSUPPORTED, IINE_ERROR_OUT_OF_MEMORY,
-/// IINE_ERROR_THREADS. Nothing is written then.
+/// IINE_ERROR_THREADS. Nothing is written then. IINE_ERROR_UNSUPPORTED is for IINE_METHOD_SIMPLE_3D_GRADIENT with
+/// IINE_BORDER_POLICY_MIRROR or IINE_SEMANTICS_PAPER.
 ///
 /// # Safety
 /// The pointers are NULL or valid as their structs say, for the whole call; no other thread uses `estimator` or
@@ -306,7 +143,8 @@ pub unsafe extern "C" fn iine_estimator_compute_indices(
 ///
 /// The window starts at (x - rect_width / 2, y - rect_height / 2). What lies outside the image is left out with
 /// IINE_BORDER_POLICY_IGNORE and folded back with IINE_BORDER_POLICY_MIRROR. Where the window gives no normal, and
-/// a size of 0 never does, NaN is written. Takes time proportional to the window's area.
+/// a size of 0 never does, NaN is written. Takes time proportional to the window's area, but with
+/// IINE_SEMANTICS_PAPER (where the border policy has no effect) or missing zeros to the cloud's.
 ///
 /// Errors: as `iine_estimator_compute`, IINE_ERROR_INDEX if the pixel is outside the cloud, and
 /// IINE_ERROR_OPTION_VALUE if a size is negative. Nothing is written then.
@@ -338,14 +176,17 @@ pub unsafe extern "C" fn iine_estimator_compute_window(
 
 /// Computes the maps behind the normals: those whose pointers in `maps` are not NULL.
 ///
-/// A map must overlap neither another map nor the range of bytes from a coordinate's first pixel to its last.
+/// A map must overlap neither another map nor the range of bytes from a coordinate's first pixel to its last. They are those of the smoothing area map's own windows, whatever one-sided windows and crease windows make of
+/// them.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_STRUCT_SIZE, IINE_ERROR_SIZE, IINE_ERROR_STRIDE,
-/// IINE_ERROR_MISALIGNED, IINE_ERROR_OVERLAP, IINE_ERROR_OUT_OF_MEMORY. Nothing is written then.
+/// IINE_ERROR_MISALIGNED, IINE_ERROR_OVERLAP, IINE_ERROR_OUT_OF_MEMORY; IINE_ERROR_UNSUPPORTED for depth radii
+/// without IINE_SEMANTICS_PAPER, eigenvalues without IINE_METHOD_COVARIANCE_MATRIX, and as
+/// `iine_estimator_compute`. Nothing is written then.
 ///
 /// # Safety
-/// The pointers are NULL or valid as their structs say, for the whole call; each map is valid for width * height
-/// writes; no other thread uses `estimator` meanwhile.
+/// The pointers are NULL or valid as their structs say, for the whole call; each map is valid for as many writes as
+/// it has elements; no other thread uses `estimator` meanwhile.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn iine_estimator_compute_maps(
     estimator: *mut iine_estimator,
@@ -358,16 +199,17 @@ pub unsafe extern "C" fn iine_estimator_compute_maps(
         // SAFETY: promised by the caller.
         let points = unsafe { read_points(points) }?;
         // SAFETY: promised by the caller.
-        let maps = unsafe { read_sized(maps, &[size_of::<iine_maps>()]) }?;
+        let maps = unsafe { read_sized(maps, &iine_maps::SIZES) }?;
         let pixels = points.width() * points.height();
         check_maps_disjoint(&maps, pixels, &points)?;
         // SAFETY: promised by the caller; they overlap nothing.
         let mut maps = unsafe {
             Maps {
-                depth_radii: None,
+                depth_radii: optional_slice(maps.depth_radii, pixels)?,
                 depth_changes: optional_slice(maps.depth_changes, pixels)?,
                 distances: optional_slice(maps.distances, pixels)?,
                 smoothing_areas: optional_slice(maps.smoothing_areas, pixels)?,
+                eigenvalues: optional_slice(maps.eigenvalues, 3 * pixels)?,
             }
         };
         estimator.compute_maps(&points, &mut maps)
@@ -381,6 +223,8 @@ fn check_maps_disjoint(maps: &iine_maps, pixels: usize, points: &Points) -> Resu
         (maps.depth_changes.addr(), pixels),
         (maps.distances.addr(), float_bytes),
         (maps.smoothing_areas.addr(), float_bytes),
+        (maps.depth_radii.addr(), float_bytes),
+        (maps.eigenvalues.addr(), 3 * float_bytes),
     ];
     let mut seen: Vec<(usize, usize)> = Vec::new();
     for (start, bytes) in maps.into_iter().filter(|(start, _)| *start != 0) {

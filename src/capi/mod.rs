@@ -4,6 +4,7 @@
 
 mod boundary;
 mod estimator;
+mod options;
 mod status;
 mod types;
 mod version;

@@ -36,7 +36,7 @@ pub const IINE_ERROR_MISALIGNED: i32 = 5;
 pub const IINE_ERROR_OVERLAP: i32 = 6;
 /// An option's value is outside its range, or an enum's number is unknown.
 pub const IINE_ERROR_OPTION_VALUE: i32 = 7;
-/// The method does not support the border policy.
+/// Options or maps that do not go together: the functions say which.
 pub const IINE_ERROR_UNSUPPORTED: i32 = 8;
 /// An index is negative or not below width x height.
 pub const IINE_ERROR_INDEX: i32 = 9;

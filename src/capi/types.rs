@@ -1,6 +1,8 @@
 //! The structs and numbers that cross the boundary.
 
-use crate::{BorderPolicy, Method};
+use std::mem::offset_of;
+
+use crate::{BorderPolicy, Depth, DistanceMetric, Method, Semantics};
 
 // The header's numbers are the core's.
 const _: () = assert!(
@@ -10,6 +12,12 @@ const _: () = assert!(
         && IINE_METHOD_SIMPLE_3D_GRADIENT == Method::Simple3DGradient as i32
         && IINE_BORDER_POLICY_IGNORE == BorderPolicy::Ignore as i32
         && IINE_BORDER_POLICY_MIRROR == BorderPolicy::Mirror as i32
+        && IINE_SEMANTICS_PCL == Semantics::Pcl as i32
+        && IINE_SEMANTICS_PAPER == Semantics::Paper as i32
+        && IINE_DISTANCE_METRIC_EUCLIDEAN == DistanceMetric::Euclidean as i32
+        && IINE_DISTANCE_METRIC_CHAMFER == DistanceMetric::Chamfer as i32
+        && IINE_DEPTH_Z == Depth::Z as i32
+        && IINE_DEPTH_RANGE == Depth::Range as i32
 );
 
 /// Eigenvector of the smallest eigenvalue of the window's covariance matrix; gives a curvature.
@@ -18,13 +26,30 @@ pub const IINE_METHOD_COVARIANCE_MATRIX: i32 = 0;
 pub const IINE_METHOD_AVERAGE_3D_GRADIENT: i32 = 1;
 /// Cross product of smoothed depth changes.
 pub const IINE_METHOD_AVERAGE_DEPTH_CHANGE: i32 = 2;
-/// Cross product of the differences of the window's outermost strips; not with IINE_BORDER_POLICY_MIRROR.
+/// Cross product of the differences of the window's outermost strips; not with IINE_BORDER_POLICY_MIRROR, nor with
+/// IINE_SEMANTICS_PAPER.
 pub const IINE_METHOD_SIMPLE_3D_GRADIENT: i32 = 3;
 
 /// The outer rows and columns, as many as the smoothing size rounded down, get no normal (the default).
 pub const IINE_BORDER_POLICY_IGNORE: i32 = 0;
 /// Windows are folded back at the border of the image.
 pub const IINE_BORDER_POLICY_MIRROR: i32 = 1;
+
+/// PCL's class, step by step; pixels get the answers that PCL gives (the default).
+pub const IINE_SEMANTICS_PCL: i32 = 0;
+/// The paper as published: windows by its smoothing area map, clipped at the border of the image, and sums over the
+/// finite points in them.
+pub const IINE_SEMANTICS_PAPER: i32 = 1;
+
+/// Exact Euclidean distance (the default).
+pub const IINE_DISTANCE_METRIC_EUCLIDEAN: i32 = 0;
+/// Borgefors' 3-4 chamfer distance, divided by 3: at most 8 % off.
+pub const IINE_DISTANCE_METRIC_CHAMFER: i32 = 1;
+
+/// Depth is z, for cameras (the default).
+pub const IINE_DEPTH_Z: i32 = 0;
+/// Depth is the distance from the origin, for spinning LiDARs.
+pub const IINE_DEPTH_RANGE: i32 = 1;
 
 /// An organized point cloud to read: width x height pixels of x, y, z (metres or any other unit).
 ///
@@ -84,7 +109,8 @@ pub struct iine_normals {
     pub curvature_row_stride: usize,
 }
 
-/// Where the maps behind the normals are written: each a packed array of width * height, or NULL for none.
+/// Where the maps behind the normals are written: each a packed array of width * height elements unless it says
+/// otherwise, or NULL for none.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[allow(non_camel_case_types)]
@@ -95,6 +121,20 @@ pub struct iine_maps {
     pub depth_changes: *mut u8,
     /// Distance in pixels to the nearest depth change (the paper's T; PCL's `getDistanceMap`).
     pub distances: *mut f32,
-    /// Smoothing area map (the paper's R): the side of the pixel's window in pixels, 0 where there is none.
+    /// Smoothing area map: the side of the pixel's window in pixels, or with IINE_SEMANTICS_PAPER its radius R
+    /// (Eq. 8); 0 where there is none.
     pub smoothing_areas: *mut f32,
+    /// Radius that the depth asks for (the paper's B, Eq. 5), within its limits, in pixels; NaN at missing points.
+    /// Only with IINE_SEMANTICS_PAPER.
+    pub depth_radii: *mut f32,
+    /// Eigenvalues of the covariance matrix (Eq. 16) of the finite points in every pixel's window, in the cloud's unit
+    /// squared: three for every pixel, ascending, so 3 * width * height elements; NaN where there is no window.
+    /// Only with IINE_METHOD_COVARIANCE_MATRIX.
+    pub eigenvalues: *mut f32,
+}
+
+impl iine_maps {
+    /// The sizes that the struct has had, up to this version's.
+    pub(super) const SIZES: [usize; 2] =
+        [offset_of!(iine_maps, depth_radii), size_of::<iine_maps>()];
 }

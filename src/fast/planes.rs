@@ -107,6 +107,7 @@ impl Planes {
     ) -> RowNews {
         let start = frame.place(y) * 3 * frame.stride;
         let row = &mut self.data[start..start + 3 * frame.stride];
+        points.prefetch(y + 2, frame.columns.clone());
         points.read_row(y, frame.columns.clone(), frame.stride, &mut row[MARGIN..], whole_points);
         let xs = row[MARGIN..].as_mut_ptr();
         // SAFETY: as the caller's; the groups lie inside the planes.

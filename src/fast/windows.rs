@@ -66,6 +66,7 @@ impl Sweep {
         let place = self.z_place(order, y);
         let z = &mut self.z[place];
         let (row, stride) = points.z_row(y);
+        points.prefetch(y + 1, 0..order.width);
         // SAFETY: row y is inside the cloud, so it has a depth at every x below the width.
         unsafe { order.read(row, stride, z) };
         z[order.segment] = z[0].previous_lane(0.0);

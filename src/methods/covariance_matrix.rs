@@ -3,7 +3,7 @@
 
 use super::{Estimate, is_finite, start};
 use crate::cloud::Points;
-use crate::eigen::{Symmetric3, smallest_eigenpair};
+use crate::eigen::{Symmetric3, eigen, smallest_eigenpair};
 use crate::window::Image;
 
 /// The plain form: the matrix about the window's mean, in two passes.
@@ -12,9 +12,30 @@ use crate::window::Image;
 pub(crate) fn estimate(
     points: &Points,
     image: &Image,
+    pixel: (usize, usize),
+    size: (usize, usize),
+) -> Estimate {
+    scatter(points, image, pixel, size).map_or(Estimate::NONE, |found| from_covariance(&found.0))
+}
+
+/// The eigenvalues of the window's covariance matrix, ascending; none if the window has no finite point.
+pub(crate) fn eigenvalues(
+    points: &Points,
+    image: &Image,
+    pixel: (usize, usize),
+    size: (usize, usize),
+) -> Option<[f64; 3]> {
+    let (scatter, count) = scatter(points, image, pixel, size)?;
+    Some(eigen(&scatter).0.map(|value| value / count))
+}
+
+/// The covariance matrix times the number of finite points, and that number.
+fn scatter(
+    points: &Points,
+    image: &Image,
     (x, y): (usize, usize),
     (width, height): (usize, usize),
-) -> Estimate {
+) -> Option<(Symmetric3, f64)> {
     let window = (start(x, width), start(y, height));
     let for_each_finite = |f: &mut dyn FnMut([f64; 3])| {
         for rect in image.rects(window, (width, height)) {
@@ -34,14 +55,14 @@ pub(crate) fn estimate(
         count += 1.0;
     });
     if count == 0.0 {
-        return Estimate::NONE;
+        return None;
     }
     mean = mean.map(|sum| sum / count);
-    let mut covariance = Symmetric3::default();
+    let mut scatter = Symmetric3::default();
     for_each_finite(&mut |point| {
-        covariance.add_outer([point[0] - mean[0], point[1] - mean[1], point[2] - mean[2]]);
+        scatter.add_outer([point[0] - mean[0], point[1] - mean[1], point[2] - mean[2]]);
     });
-    from_covariance(&covariance)
+    Some((scatter, count))
 }
 
 /// The estimate from a (scaled) covariance matrix.

@@ -19,6 +19,28 @@ pub(crate) fn estimate(method: Method, cloud: &impl CleanPoints, rect: &Rect) ->
 /// CM (Eq. 16-25): the eigenvector of the smallest eigenvalue of the points' covariance matrix, that eigenvalue over
 /// the trace as curvature, and the matrix's eigenvalues, ascending. None if the points are on one line.
 pub(crate) fn plane_of(points: impl Iterator<Item = [f64; 3]>) -> Option<(Estimate, [f64; 3])> {
+    let (scatter, count) = scatter(points);
+    let (values, vector) = eigen(&scatter);
+    let trace = scatter.trace();
+    // Rounding keeps points on a line from a middle eigenvalue of exactly 0.
+    const LINE: f64 = 1e-12;
+    if count < 3.0 || values[1] <= LINE * trace {
+        return None;
+    }
+    let estimate =
+        Estimate { normal: vector.map(|c| c as f32), curvature: (values[0] / trace) as f32 };
+    Some((estimate, values.map(|value| value / count)))
+}
+
+/// The eigenvalues of the covariance matrix (Eq. 16) of the finite points in a rectangle, ascending; none if there
+/// are no points.
+pub(crate) fn eigenvalues(cloud: &impl CleanPoints, rect: &Rect) -> Option<[f64; 3]> {
+    let (scatter, count) = scatter(cloud.finite(rect));
+    (count > 0.0).then(|| eigen(&scatter).0.map(|value| value / count))
+}
+
+/// The points' covariance matrix times their number, and their number.
+fn scatter(points: impl Iterator<Item = [f64; 3]>) -> (Symmetric3, f64) {
     let points: Vec<[f64; 3]> = points.collect();
     let count = points.len() as f64;
     let mut mean = [0.0; 3];
@@ -27,20 +49,11 @@ pub(crate) fn plane_of(points: impl Iterator<Item = [f64; 3]>) -> Option<(Estima
             mean[i] += point[i] / count;
         }
     }
-    let mut covariance = Symmetric3::default();
+    let mut scatter = Symmetric3::default();
     for point in &points {
-        covariance.add_outer([point[0] - mean[0], point[1] - mean[1], point[2] - mean[2]]);
+        scatter.add_outer([point[0] - mean[0], point[1] - mean[1], point[2] - mean[2]]);
     }
-    let (values, vector) = eigen(&covariance);
-    let trace = covariance.trace();
-    // Rounding keeps points on a line from a middle eigenvalue of exactly 0.
-    const LINE: f64 = 1e-12;
-    if points.len() < 3 || values[1] <= LINE * trace {
-        return None;
-    }
-    let estimate =
-        Estimate { normal: vector.map(|c| c as f32), curvature: (values[0] / trace) as f32 };
-    Some((estimate, values.map(|value| value / count)))
+    (scatter, count)
 }
 
 /// The 3-D gradient method: the cross product of the mean central differences of the points.

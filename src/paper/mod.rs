@@ -78,6 +78,44 @@ impl PaperMaps {
     }
 }
 
+/// The covariance matrices' eigenvalues of all pixels with one of these radii; NaN for the others.
+pub(crate) fn eigenvalue_map(points: &Points, options: &Options, radii: &[f32]) -> Vec<[f32; 3]> {
+    let cloud = Cloud::new(points, options);
+    let (width, height) = (cloud.width, cloud.height);
+    let of_pixel = |(at, &radius): (usize, &f32)| {
+        if radius == 0.0 {
+            return [f32::NAN; 3];
+        }
+        let pixel = (at % width, at / width);
+        let rect = smoothing_area::window(pixel, radius as usize, width, height);
+        let values = methods::eigenvalues(&cloud, &rect);
+        values.map_or([f32::NAN; 3], |values| values.map(|value| value as f32))
+    };
+    radii.iter().enumerate().map(of_pixel).collect()
+}
+
+/// The points, row by row, with NaN for every missing one.
+pub(crate) fn with_missing_as_nan(points: &Points, options: &Options) -> Vec<[f32; 3]> {
+    Cloud::new(points, options).points
+}
+
+/// The estimate of a pixel from the part of a window of any `size` that lies inside the image, not turned.
+pub(crate) fn estimate_window(
+    points: &Points,
+    options: &Options,
+    (x, y): (usize, usize),
+    size: (usize, usize),
+) -> Estimate {
+    let range = |at: usize, size: usize, limit: usize| {
+        at.saturating_sub(size / 2)..(at + size).saturating_sub(size / 2).min(limit)
+    };
+    let rect = Rect { x: range(x, size.0, points.width()), y: range(y, size.1, points.height()) };
+    if rect.x.is_empty() || rect.y.is_empty() {
+        return Estimate::NONE;
+    }
+    methods::estimate(options.method, &Cloud::new(points, options), &rect)
+}
+
 fn depth_changes(cloud: &Cloud, options: &Options) -> DepthChanges {
     DepthChanges::find(cloud, |depth, difference, gap| {
         is_depth_change(depth, difference, gap, options)

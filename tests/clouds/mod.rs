@@ -3,7 +3,10 @@
 
 #![allow(dead_code)] // every test takes what it needs
 
-use iine::{BorderPolicy, Estimator, Isa, Method, Normals, Options, Points};
+use iine::{
+    BorderPolicy, Depth, DistanceMetric, Estimator, Isa, Method, Normals, Options, Points,
+    Semantics,
+};
 
 /// Numbers that look random, the same for the same seed.
 pub struct Random(u64);
@@ -222,6 +225,38 @@ pub fn options(
     options.normal_smoothing_size = normal_smoothing_size;
     options.depth_dependent_smoothing = depth_dependent_smoothing;
     options
+}
+
+/// The paper's methods with its defaults, small and large windows, few and many depth changes, other depths.
+pub fn paper_options() -> Vec<Options> {
+    let mut all = Vec::new();
+    for method in Method::ALL.into_iter().filter(|method| *method != Method::Simple3DGradient) {
+        for variant in 0..5 {
+            let mut options = Options::default();
+            options.semantics = Semantics::Paper;
+            options.method = method;
+            let paper = &mut options.paper;
+            match variant {
+                0 => {}
+                1 => {
+                    (paper.smallest_radius, paper.least_depth_radius) = (1, 1);
+                    (paper.largest_radius, paper.gamma) = (6, 2.0);
+                }
+                2 => {
+                    (paper.least_depth_radius, paper.largest_radius) = (25, 40);
+                    paper.gamma = 50.0;
+                }
+                3 => {
+                    paper.depth = Depth::Range;
+                    options.zero_is_missing = true;
+                    options.viewpoint = [0.5, -1.0, 0.25];
+                }
+                _ => paper.distance_metric = DistanceMetric::Chamfer,
+            }
+            all.push(options);
+        }
+    }
+    all
 }
 
 /// nx, ny, nz, curvature of every pixel.

@@ -29,6 +29,9 @@ namespace iine
     * Takes the place of pcl::IntegralImageNormalEstimation: the same public members, defaults and results. All
     * computation is libiine's; this class hands it the clouds' own memory, in and out.
     *
+    * What PCL's class does not have is off by default: \ref setSemantics follows the paper instead of PCL,
+    * \ref setOneSidedWindows and \ref setCreaseWindows improve both near edges.
+    *
     * What differs from PCL's class:
     * - the cloud is read when compute is called, not when it is set;
     * - output k belongs to indices[k] whatever the indices are, and equals what the whole cloud gives there;
@@ -71,6 +74,27 @@ namespace iine
         AVERAGE_3D_GRADIENT,  ///< cross product of the mean 3-D gradients
         AVERAGE_DEPTH_CHANGE, ///< cross product of smoothed depth changes
         SIMPLE_3D_GRADIENT    ///< cross product of the differences of the outermost strips; not with MIRROR
+      };
+
+      /** \brief Whose definition of the windows and sums is followed. Not in PCL's class. */
+      enum Semantics
+      {
+        SEMANTICS_PCL,  ///< PCL's class, step by step
+        SEMANTICS_PAPER ///< the paper as published (docs/paper.md); not with SIMPLE_3D_GRADIENT
+      };
+
+      /** \brief How the distance to the nearest depth change is measured with SEMANTICS_PAPER. Not in PCL's class. */
+      enum DistanceMetric
+      {
+        DISTANCE_METRIC_EUCLIDEAN, ///< exact
+        DISTANCE_METRIC_CHAMFER    ///< Borgefors' 3-4 chamfer distance, at most 8 % off
+      };
+
+      /** \brief What a point's depth is with SEMANTICS_PAPER. Not in PCL's class. */
+      enum Depth
+      {
+        DEPTH_Z,    ///< z, for cameras
+        DEPTH_RANGE ///< the distance from the origin, for spinning LiDARs
       };
 
       using PointCloudIn = typename pcl::Feature<PointInT, PointOutT>::PointCloudIn;
@@ -118,7 +142,7 @@ namespace iine
       void
       setBorderPolicy (const BorderPolicy border_policy)
       {
-        border_policy_ = border_policy;
+        options_.border_policy = border_policy;
       }
 
       /** \brief Compute the normal of one pixel over the window of \ref setRectSize; what lies outside the image is
@@ -156,7 +180,7 @@ namespace iine
       void
       setMaxDepthChangeFactor (float max_depth_change_factor)
       {
-        max_depth_change_factor_ = max_depth_change_factor;
+        options_.max_depth_change_factor = max_depth_change_factor;
       }
 
       /** \brief Set the side of the largest window.
@@ -169,10 +193,10 @@ namespace iine
         if (!std::isfinite (normal_smoothing_size) || normal_smoothing_size <= 0)
         {
           PCL_ERROR ("[iine::%s::setNormalSmoothingSize] %f is not a finite number above 0; the size stays %f.\n",
-                     feature_name_.c_str (), normal_smoothing_size, normal_smoothing_size_);
+                     feature_name_.c_str (), normal_smoothing_size, options_.normal_smoothing_size);
           return;
         }
-        normal_smoothing_size_ = normal_smoothing_size;
+        options_.normal_smoothing_size = normal_smoothing_size;
       }
 
       /** \brief Set the method.
@@ -181,7 +205,7 @@ namespace iine
       void
       setNormalEstimationMethod (NormalEstimationMethod normal_estimation_method)
       {
-        normal_estimation_method_ = normal_estimation_method;
+        options_.normal_estimation_method = normal_estimation_method;
       }
 
       /** \brief Set whether a tenth of a pixel's z is added to its smoothing size.
@@ -190,7 +214,7 @@ namespace iine
       void
       setDepthDependentSmoothing (bool use_depth_dependent_smoothing)
       {
-        use_depth_dependent_smoothing_ = use_depth_dependent_smoothing;
+        options_.use_depth_dependent_smoothing = use_depth_dependent_smoothing;
       }
 
       /** \brief Set the cloud. It must be organized, and is read when compute is called.
@@ -201,7 +225,7 @@ namespace iine
       setInputCloud (const typename PointCloudIn::ConstPtr &cloud) override
       {
         input_ = cloud;
-        forgetDistanceMap ();
+        forgetMaps ();
         if (!cloud)
           return;
         if (!cloud->isOrganized ())
@@ -229,19 +253,63 @@ namespace iine
       float *
       getDistanceMap ()
       {
-        if (!has_distance_map_)
+        if (!has_maps_)
           return (nullptr);
-        if (distance_map_.empty ())
+        if (distance_map_.empty () && !computeMap ("getDistanceMap", distance_map_, 1, &iine_maps::distances))
         {
-          const int status = computeDistanceMap ();
-          if (status != IINE_OK)
-          {
-            report ("getDistanceMap", status);
-            forgetDistanceMap ();
-            return (nullptr);
-          }
+          forgetMaps ();
+          return (nullptr);
         }
         return (distance_map_.data ());
+      }
+
+      /** \brief Get where there are depth changes in the last computed cloud. Not in PCL's class.
+        *
+        * This map and those below are computed by the call, from the cloud as it is then and the options of the last
+        * compute. They are those of the smoothing area map's own windows, whatever \ref setOneSidedWindows and
+        * \ref setCreaseWindows say.
+        * \param[out] map width * height values, row by row: 1 at a depth change, else 0
+        * \return whether it was computed; if not (there has been no successful compute since \ref setInputCloud),
+        * the map is empty and an error is printed
+        */
+      bool
+      getDepthChangeMap (std::vector<std::uint8_t> &map)
+      {
+        return (computeMap ("getDepthChangeMap", map, 1, &iine_maps::depth_changes));
+      }
+
+      /** \brief Get the window of every pixel of the last computed cloud. Not in PCL's class.
+        * \param[out] map width * height values, row by row: the window's side in pixels, or with SEMANTICS_PAPER its
+        * radius R (Eq. 8); 0 where there is none
+        * \return as \ref getDepthChangeMap
+        */
+      bool
+      getSmoothingAreaMap (std::vector<float> &map)
+      {
+        return (computeMap ("getSmoothingAreaMap", map, 1, &iine_maps::smoothing_areas));
+      }
+
+      /** \brief Get the radius that the depth of every pixel of the last computed cloud asks for (the paper's B,
+        * Eq. 5). Not in PCL's class; with SEMANTICS_PAPER only.
+        * \param[out] map width * height values in pixels, row by row; NaN at missing points
+        * \return as \ref getDepthChangeMap
+        */
+      bool
+      getDepthRadiusMap (std::vector<float> &map)
+      {
+        return (computeMap ("getDepthRadiusMap", map, 1, &iine_maps::depth_radii));
+      }
+
+      /** \brief Get the eigenvalues of the covariance matrix of every pixel's window of the last computed cloud. Not in
+        * PCL's class; with COVARIANCE_MATRIX only.
+        * \param[out] map 3 * width * height values in the cloud's unit squared, row by row: three for every pixel,
+        * ascending; NaN where there is no window
+        * \return as \ref getDepthChangeMap
+        */
+      bool
+      getEigenvalueMap (std::vector<float> &map)
+      {
+        return (computeMap ("getEigenvalueMap", map, 3, &iine_maps::eigenvalues));
       }
 
       /** \brief Set the point that normals are turned towards, instead of the cloud's sensor origin.
@@ -252,9 +320,9 @@ namespace iine
       void
       setViewPoint (float vpx, float vpy, float vpz)
       {
-        vpx_ = vpx;
-        vpy_ = vpy;
-        vpz_ = vpz;
+        options_.vpx = vpx;
+        options_.vpy = vpy;
+        options_.vpz = vpz;
         use_sensor_origin_ = false;
       }
 
@@ -267,9 +335,9 @@ namespace iine
       void
       getViewPoint (float &vpx, float &vpy, float &vpz)
       {
-        vpx = vpx_;
-        vpy = vpy_;
-        vpz = vpz_;
+        vpx = options_.vpx;
+        vpy = options_.vpy;
+        vpz = options_.vpz;
       }
 
       /** \brief Turn normals towards the cloud's sensor origin, of the cloud set now and of those set later. */
@@ -280,7 +348,7 @@ namespace iine
         if (input_)
           readSensorOrigin ();
         else
-          vpx_ = vpy_ = vpz_ = 0.0f;
+          options_.vpx = options_.vpy = options_.vpz = 0.0f;
       }
 
       /** \brief Set the number of threads; the result does not depend on it. Not in PCL's class.
@@ -290,7 +358,133 @@ namespace iine
       void
       setNumberOfThreads (unsigned number_of_threads)
       {
-        number_of_threads_ = number_of_threads;
+        options_.number_of_threads = number_of_threads;
+      }
+
+      /** \brief Set whose definition of the windows and sums is followed. Not in PCL's class.
+        *
+        * With SEMANTICS_PAPER the border policy, the smoothing size, depth dependent smoothing and the depth change
+        * factor have no effect; setPaper* set what takes their place. docs/paper.md has the equations.
+        * \param[in] semantics the semantics; default SEMANTICS_PCL
+        */
+      void
+      setSemantics (Semantics semantics)
+      {
+        options_.semantics = semantics;
+      }
+
+      /** \brief Set alpha: the smallest depth change that the sensor can tell at depth d is alpha d^2 (Eq. 4). Used by
+        * SEMANTICS_PAPER and by \ref setCreaseWindows. Not in PCL's class.
+        * \param[in] alpha in 1/unit of length, finite and above 0, default 0.0028; anything else is refused with a
+        * printed error. \ref alphaOfSensor gives it
+        */
+      void
+      setPaperAlpha (float alpha)
+      {
+        if (isTaken ("setPaperAlpha", iine_estimator_set_paper_alpha (handle_.get (), alpha)))
+          options_.paper_alpha = alpha;
+      }
+
+      /** \brief Set beta: the radius of the window is beta alpha d^2 (Eq. 5). Not in PCL's class.
+        * \param[in] beta in pixels/unit of length, finite and above 0, default 800; anything else is refused with a
+        * printed error
+        */
+      void
+      setPaperBeta (float beta)
+      {
+        if (isTaken ("setPaperBeta", iine_estimator_set_paper_beta (handle_.get (), beta)))
+          options_.paper_beta = beta;
+      }
+
+      /** \brief Set gamma: neighbours whose depths differ by gamma alpha d^2 or more are a depth change apart (Eq. 6).
+        * Not in PCL's class.
+        * \param[in] gamma without unit, finite and above 0, default 5; anything else is refused with a printed error
+        */
+      void
+      setPaperGamma (float gamma)
+      {
+        if (isTaken ("setPaperGamma", iine_estimator_set_paper_gamma (handle_.get (), gamma)))
+          options_.paper_gamma = gamma;
+      }
+
+      /** \brief Set the limits of the window's radius with SEMANTICS_PAPER, in pixels. Not in PCL's class.
+        *
+        * 1 <= smallest <= least_depth <= largest <= 1000; anything else is refused with a printed error.
+        * \param[in] smallest where the radius is below this there is no window; default 2
+        * \param[in] least_depth the depth asks for at least this; default 5
+        * \param[in] largest and for at most this; default 20
+        */
+      void
+      setPaperRadii (unsigned smallest, unsigned least_depth, unsigned largest)
+      {
+        const int status = iine_estimator_set_paper_radii (handle_.get (), smallest, least_depth, largest);
+        if (!isTaken ("setPaperRadii", status))
+          return;
+        options_.smallest_radius = smallest;
+        options_.least_depth_radius = least_depth;
+        options_.largest_radius = largest;
+      }
+
+      /** \brief Set how the distance to the nearest depth change is measured with SEMANTICS_PAPER. Not in PCL's class.
+        * \param[in] distance_metric the metric; default DISTANCE_METRIC_EUCLIDEAN
+        */
+      void
+      setPaperDistanceMetric (DistanceMetric distance_metric)
+      {
+        options_.distance_metric = distance_metric;
+      }
+
+      /** \brief Set what a point's depth is with SEMANTICS_PAPER. Not in PCL's class.
+        * \param[in] depth the depth; default DEPTH_Z
+        */
+      void
+      setPaperDepth (Depth depth)
+      {
+        options_.depth = depth;
+      }
+
+      /** \brief Set whether points at (0, 0, 0) are missing, as LiDARs and some depth cameras write them. Not in PCL's
+        * class.
+        * \param[in] zero_is_missing whether they are; default false
+        */
+      void
+      setZeroIsMissing (bool zero_is_missing)
+      {
+        options_.zero_is_missing = zero_is_missing;
+      }
+
+      /** \brief Set whether pixels near a depth change get a window of their own side, and with it a normal every pixel
+        * that has two neighbours on its surface not in line with it. With either semantics. Not in PCL's class.
+        * \param[in] one_sided_windows whether they do; default false
+        */
+      void
+      setOneSidedWindows (bool one_sided_windows)
+      {
+        options_.one_sided_windows = one_sided_windows;
+      }
+
+      /** \brief Set whether a second pass moves windows off the places where the normals of the first vary strongly, so
+        * that edges without a depth change stay sharp. With either semantics, and the alpha of \ref setPaperAlpha. Not
+        * in PCL's class.
+        * \param[in] crease_windows whether it does; default false
+        */
+      void
+      setCreaseWindows (bool crease_windows)
+      {
+        options_.crease_windows = crease_windows;
+      }
+
+      /** \brief The alpha of a stereo or structured light sensor: disparity_step / (focal * baseline). Not in PCL's
+        * class.
+        * \param[in] disparity_step its smallest step of disparity, in pixels
+        * \param[in] focal its focal length, in pixels
+        * \param[in] baseline its baseline, in the cloud's unit
+        * \return the alpha for \ref setPaperAlpha
+        */
+      static float
+      alphaOfSensor (float disparity_step, float focal, float baseline)
+      {
+        return (iine_alpha_of_sensor (disparity_step, focal, baseline));
       }
 
       /** \brief Get the outcome of the last compute, \ref computePointNormal or \ref computePointNormalMirror. Not in
@@ -308,7 +502,7 @@ namespace iine
       bool
       initCompute () override
       {
-        forgetDistanceMap ();
+        forgetMaps ();
         last_status_ = checkInput ();
         if (last_status_ != IINE_OK)
         {
@@ -337,7 +531,8 @@ namespace iine
 
       /** \brief Compute the normals of the whole cloud or of the indices.
         *
-        * If that fails all normals are NaN, the status says why, and an error is printed.
+        * If that fails all normals are NaN, the status says why, and an error is printed. That includes
+        * SIMPLE_3D_GRADIENT with SEMANTICS_PAPER.
         * \param[out] output the normals, its size already right
         * \throws pcl::PCLException for SIMPLE_3D_GRADIENT with BORDER_POLICY_MIRROR
         */
@@ -351,8 +546,8 @@ namespace iine
         last_status_ = computeNormals (output);
         if (last_status_ == IINE_OK)
         {
-          has_distance_map_ = true;
-          computed_factor_ = max_depth_change_factor_;
+          has_maps_ = true;
+          computed_options_ = options_;
           return;
         }
         for (auto &point : output)
@@ -362,6 +557,32 @@ namespace iine
       }
 
     private:
+      /** \brief The options of the C estimator, with PCL's names and defaults. */
+      struct Options
+      {
+        NormalEstimationMethod normal_estimation_method = AVERAGE_3D_GRADIENT;
+        BorderPolicy border_policy = BORDER_POLICY_IGNORE;
+        bool use_depth_dependent_smoothing = false;
+        float max_depth_change_factor = 20.0f * 0.001f;
+        float normal_smoothing_size = 10.0f;
+        float vpx = 0.0f;
+        float vpy = 0.0f;
+        float vpz = 0.0f;
+        unsigned number_of_threads = 1;
+        Semantics semantics = SEMANTICS_PCL;
+        float paper_alpha = 0.0028f;
+        float paper_beta = 800.0f;
+        float paper_gamma = 5.0f;
+        unsigned smallest_radius = 2;
+        unsigned least_depth_radius = 5;
+        unsigned largest_radius = 20;
+        DistanceMetric distance_metric = DISTANCE_METRIC_EUCLIDEAN;
+        Depth depth = DEPTH_Z;
+        bool zero_is_missing = false;
+        bool one_sided_windows = false;
+        bool crease_windows = false;
+      };
+
       /** \brief The C estimator, made when it is first used. A copy gets one of its own. */
       class Handle
       {
@@ -409,14 +630,14 @@ namespace iine
       bool
       isKnownBorderPolicy () const
       {
-        const int policy = static_cast<int> (border_policy_);
+        const int policy = static_cast<int> (options_.border_policy);
         return (policy == BORDER_POLICY_IGNORE || policy == BORDER_POLICY_MIRROR);
       }
 
       bool
       isKnownMethod () const
       {
-        const int method = static_cast<int> (normal_estimation_method_);
+        const int method = static_cast<int> (options_.normal_estimation_method);
         return (method >= COVARIANCE_MATRIX && method <= SIMPLE_3D_GRADIENT);
       }
 
@@ -433,36 +654,53 @@ namespace iine
       void
       readSensorOrigin ()
       {
-        vpx_ = input_->sensor_origin_.coeff (0);
-        vpy_ = input_->sensor_origin_.coeff (1);
-        vpz_ = input_->sensor_origin_.coeff (2);
+        options_.vpx = input_->sensor_origin_.coeff (0);
+        options_.vpy = input_->sensor_origin_.coeff (1);
+        options_.vpz = input_->sensor_origin_.coeff (2);
       }
 
       /** \brief Hand all options to the C estimator.
-        * \param[in] border_policy the border policy, an enumerator or not
+        * \param[in] options the options
         * \return a status
         */
       int
-      setOptions (int border_policy)
+      setOptions (const Options &options)
       {
-        iine_estimator *estimator = handle_.get ();
-        if (estimator == nullptr)
+        iine_estimator *e = handle_.get ();
+        if (e == nullptr)
           return (IINE_ERROR_OUT_OF_MEMORY);
-        const int method = static_cast<int> (normal_estimation_method_);
-        int status = iine_estimator_set_method (estimator, method);
-        if (status == IINE_OK)
-          status = iine_estimator_set_border_policy (estimator, border_policy);
-        if (status == IINE_OK)
-          status = iine_estimator_set_normal_smoothing_size (estimator, normal_smoothing_size_);
-        if (status == IINE_OK)
-          status = iine_estimator_set_depth_dependent_smoothing (estimator, use_depth_dependent_smoothing_ ? 1 : 0);
-        if (status == IINE_OK)
-          status = iine_estimator_set_max_depth_change_factor (estimator, max_depth_change_factor_);
-        if (status == IINE_OK)
-          status = iine_estimator_set_viewpoint (estimator, vpx_, vpy_, vpz_);
-        if (status == IINE_OK)
-          status = iine_estimator_set_threads (estimator, number_of_threads_);
-        return (status);
+        const int statuses[] = {
+            iine_estimator_set_method (e, static_cast<int> (options.normal_estimation_method)),
+            iine_estimator_set_border_policy (e, static_cast<int> (options.border_policy)),
+            iine_estimator_set_normal_smoothing_size (e, options.normal_smoothing_size),
+            iine_estimator_set_depth_dependent_smoothing (e, options.use_depth_dependent_smoothing ? 1 : 0),
+            iine_estimator_set_max_depth_change_factor (e, options.max_depth_change_factor),
+            iine_estimator_set_viewpoint (e, options.vpx, options.vpy, options.vpz),
+            iine_estimator_set_threads (e, options.number_of_threads),
+            iine_estimator_set_semantics (e, static_cast<int> (options.semantics)),
+            iine_estimator_set_paper_alpha (e, options.paper_alpha),
+            iine_estimator_set_paper_beta (e, options.paper_beta),
+            iine_estimator_set_paper_gamma (e, options.paper_gamma),
+            iine_estimator_set_paper_radii (e, options.smallest_radius, options.least_depth_radius,
+                                            options.largest_radius),
+            iine_estimator_set_paper_distance_metric (e, static_cast<int> (options.distance_metric)),
+            iine_estimator_set_paper_depth (e, static_cast<int> (options.depth)),
+            iine_estimator_set_zero_is_missing (e, options.zero_is_missing ? 1 : 0),
+            iine_estimator_set_one_sided_windows (e, options.one_sided_windows ? 1 : 0),
+            iine_estimator_set_crease_windows (e, options.crease_windows ? 1 : 0)};
+        for (const int status : statuses)
+          if (status != IINE_OK)
+            return (status);
+        return (IINE_OK);
+      }
+
+      /** \brief Whether a setter of the C API took its value; if not, an error is printed. */
+      bool
+      isTaken (const char *member, int status) const
+      {
+        if (status != IINE_OK)
+          report (member, status);
+        return (status == IINE_OK);
       }
 
       /** \brief The cloud's memory as the C API takes it; the cloud has been checked. */
@@ -525,7 +763,7 @@ namespace iine
         // Checked again: where the output is the input cloud, it has been resized to the indices meanwhile.
         int status = checkInput ();
         if (status == IINE_OK)
-          status = setOptions (static_cast<int> (border_policy_));
+          status = setOptions (options_);
         if (status != IINE_OK || output.empty ())
           return (status);
         const iine_points points = inputPoints ();
@@ -541,8 +779,10 @@ namespace iine
       computeWindow (BorderPolicy border_policy, int pos_x, int pos_y, PointOutT &normal)
       {
         last_status_ = checkInput ();
+        Options options = options_;
+        options.border_policy = border_policy;
         if (last_status_ == IINE_OK)
-          last_status_ = setOptions (border_policy);
+          last_status_ = setOptions (options);
         if (last_status_ == IINE_OK)
         {
           const iine_points points = inputPoints ();
@@ -559,40 +799,49 @@ namespace iine
         report ("computePointNormal", last_status_);
       }
 
-      int
-      computeDistanceMap ()
+      /** \brief Compute one of the maps from the cloud as it is and the options of the last compute.
+        * \param[in] member the member function that was called
+        * \param[out] map the map, empty if it cannot be had
+        * \param[in] values_per_pixel how many values a pixel has
+        * \param[in] field the map's field in the struct of the C API
+        * \return whether it was computed; if not, an error is printed
+        */
+      template <typename Value> bool
+      computeMap (const char *member, std::vector<Value> &map, std::size_t values_per_pixel,
+                  Value *iine_maps::*field)
       {
-        int status = checkInput ();
-        if (status != IINE_OK)
-          return (status);
-        iine_estimator *estimator = handle_.get ();
-        if (estimator == nullptr)
-          return (IINE_ERROR_OUT_OF_MEMORY);
-        // Of all options only the factor matters to the map, but the method and the policy must go together.
-        status = iine_estimator_set_border_policy (estimator, IINE_BORDER_POLICY_IGNORE);
+        map.clear ();
+        int status = has_maps_ ? checkInput () : IINE_ERROR_NULL_POINTER;
         if (status == IINE_OK)
-          status = iine_estimator_set_max_depth_change_factor (estimator, computed_factor_);
-        if (status != IINE_OK)
-          return (status);
-        distance_map_.resize (input_->size ());
-        const iine_points points = inputPoints ();
-        iine_maps maps = {};
-        maps.struct_size = sizeof (maps);
-        maps.distances = distance_map_.data ();
-        return (iine_estimator_compute_maps (estimator, &points, &maps));
+          status = setOptions (computed_options_);
+        if (status == IINE_OK)
+        {
+          map.resize (input_->size () * values_per_pixel);
+          const iine_points points = inputPoints ();
+          iine_maps maps = {};
+          maps.struct_size = sizeof (maps);
+          maps.*field = map.data ();
+          status = iine_estimator_compute_maps (handle_.get (), &points, &maps);
+        }
+        if (status == IINE_OK)
+          return (true);
+        map.clear ();
+        report (member, status);
+        return (false);
       }
 
       void
-      forgetDistanceMap ()
+      forgetMaps ()
       {
-        has_distance_map_ = false;
+        has_maps_ = false;
         distance_map_.clear ();
       }
 
-      static void
-      throwIfUnsupported (int status)
+      /** \brief Throw where PCL throws: for SIMPLE_3D_GRADIENT with BORDER_POLICY_MIRROR. */
+      void
+      throwIfUnsupported (int status) const
       {
-        if (status == IINE_ERROR_UNSUPPORTED)
+        if (status == IINE_ERROR_UNSUPPORTED && options_.semantics == SEMANTICS_PCL)
           PCL_THROW_EXCEPTION (pcl::PCLException, iine_status_string (status));
       }
 
@@ -602,44 +851,24 @@ namespace iine
         PCL_ERROR ("[iine::%s::%s] %s.\n", feature_name_.c_str (), member, iine_status_string (status));
       }
 
-      /** \brief The method. */
-      NormalEstimationMethod normal_estimation_method_ = AVERAGE_3D_GRADIENT;
+      /** \brief The options set. */
+      Options options_;
 
-      /** \brief The border policy. */
-      BorderPolicy border_policy_ = BORDER_POLICY_IGNORE;
+      /** \brief The options at the last compute, which the maps belong to. */
+      Options computed_options_;
 
       /** \brief The window of computePointNormal. */
       int rect_width_ = 0;
       int rect_height_ = 0;
 
-      /** \brief Whether a tenth of z is added to the smoothing size. */
-      bool use_depth_dependent_smoothing_ = false;
-
-      /** \brief The factor of the depth change threshold. */
-      float max_depth_change_factor_ = 20.0f * 0.001f;
-
-      /** \brief The side of the largest window. */
-      float normal_smoothing_size_ = 10.0f;
-
-      /** \brief The point that normals are turned towards. */
-      float vpx_ = 0.0f;
-      float vpy_ = 0.0f;
-      float vpz_ = 0.0f;
-
       /** \brief Whether that point is the cloud's sensor origin. */
       bool use_sensor_origin_ = true;
-
-      /** \brief The number of threads asked for. */
-      unsigned number_of_threads_ = 1;
 
       /** \brief The outcome of the last computation. */
       int last_status_ = IINE_OK;
 
-      /** \brief Whether there is a distance map to give, or to compute when it is asked for. */
-      bool has_distance_map_ = false;
-
-      /** \brief The factor at the last compute, which the distance map belongs to. */
-      float computed_factor_ = 0.0f;
+      /** \brief Whether there are maps to compute when they are asked for. */
+      bool has_maps_ = false;
 
       /** \brief The distance map; empty until it is asked for. */
       std::vector<float> distance_map_;

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::cloud::Points;
+use crate::fast::lanes::transpose4;
 use crate::fast::planes::grow;
 use crate::simd::{GROUP, Simd};
 
@@ -20,19 +21,21 @@ pub(crate) trait Channels<const N: usize> {
 pub(crate) struct Rings<const N: usize> {
     /// Element i of a row is the sum over the columns before the i-th.
     sums: Vec<[f64; N]>,
-    /// Element i + 1 of a row is the point of the i-th column; the first and the last are missing points.
+    /// Element i + 1 of a row is the point of the i-th column; the first and those after the last are missing points.
     points: Vec<Counted>,
     columns: Range<usize>,
     /// Rows in a ring.
     pub rows: usize,
-    /// The largest coordinate read so far.
-    largest: Counted,
+    /// The row of points read last, coordinate by coordinate.
+    planes: Vec<f32>,
+    /// The largest magnitude of a coordinate read so far.
+    pub largest: f32,
 }
 
 impl<const N: usize> Default for Rings<N> {
     fn default() -> Self {
-        let (sums, points) = (Vec::new(), Vec::new());
-        Rings { sums, points, columns: 0..0, rows: 0, largest: [0.0; 4] }
+        let (sums, points, planes) = (Vec::new(), Vec::new(), Vec::new());
+        Rings { sums, points, columns: 0..0, rows: 0, planes, largest: 0.0 }
     }
 }
 
@@ -47,12 +50,14 @@ impl<const N: usize> Rings<N> {
 
     /// Bytes held.
     pub fn size(&self) -> usize {
-        self.sums.capacity() * size_of::<[f64; N]>() + self.points.capacity() * size_of::<Counted>()
+        self.sums.capacity() * size_of::<[f64; N]>()
+            + self.points.capacity() * size_of::<Counted>()
+            + self.planes.capacity() * size_of::<f32>()
     }
 
     /// Starts over at row `top`, with windows of up to `radius`.
     pub fn start(&mut self, columns: Range<usize>, top: usize, radius: usize) {
-        (self.columns, self.largest) = (columns, [0.0; 4]);
+        (self.columns, self.largest) = (columns, 0.0);
         self.rows = rows_of_rings(radius);
         let length = self.rows * self.stride();
         grow(&mut self.points, length + GROUP);
@@ -67,7 +72,7 @@ impl<const N: usize> Rings<N> {
     /// Elements from a row to the next.
     #[inline(always)]
     pub fn stride(&self) -> usize {
-        self.columns.len() + 2
+        self.columns.len().next_multiple_of(GROUP) + 2
     }
 
     /// The first column.
@@ -110,44 +115,42 @@ impl<const N: usize> Rings<N> {
         whole_points: bool,
     ) {
         let row = self.row(y);
-        let to = &mut self.points[row.start + 1..row.end - 1];
-        let Range { start, end } = self.columns;
-        assert!(y < points.height() && start < end && end <= points.width());
-        assert!(end.next_multiple_of(GROUP) <= depths.len());
-        let mut largest = self.largest;
-        for x in (start..end).step_by(GROUP) {
-            let count = (end - x).min(GROUP);
-            let to = &mut to[x - start..x - start + count];
-            let mut there = [0.0_f32; GROUP];
-            // SAFETY: as the caller's; the pixels are inside the cloud, and the depths readable in whole groups.
-            unsafe {
-                let depths = S::load(depths.as_ptr().add(x));
-                S::store(there.as_mut_ptr(), S::eq(depths, depths));
-                if whole_points && count == GROUP && x + count < end {
-                    for i in 0..GROUP {
-                        let point = points.whole_at_unchecked(x + i, y);
-                        put(&mut to[i], there[i], point, &mut largest);
-                    }
-                } else {
-                    for i in 0..count {
-                        let [x, y, z] = points.at_unchecked(x + i, y);
-                        put(&mut to[i], there[i], [x, y, z, 0.0], &mut largest);
-                    }
+        let count = self.columns.len();
+        let length = count.next_multiple_of(GROUP);
+        assert!(self.columns.start + length <= depths.len());
+        grow(&mut self.planes, 3 * (length + GROUP));
+        let stride = length + GROUP;
+        points.read_row(y, self.columns.clone(), stride, &mut self.planes, whole_points);
+        let to = &mut self.points[row][1..];
+        // SAFETY: as the caller's; the planes, the depths and the row have room for whole groups.
+        unsafe {
+            let mut largest = S::splat(self.largest);
+            for x in (0..length).step_by(GROUP) {
+                let depths = S::load(depths.as_ptr().add(self.columns.start + x));
+                let there = S::eq(depths, depths);
+                let mut fields = [[0.0; GROUP]; 4];
+                for c in 0..3 {
+                    let field = S::load(self.planes.as_ptr().add(c * stride + x));
+                    let field = S::and(there, field);
+                    largest = S::max(S::abs(field), largest);
+                    S::store(fields[c].as_mut_ptr(), field);
                 }
+                S::store(fields[3].as_mut_ptr(), S::and(there, S::splat(1.0)));
+                let (from, to) = (fields.as_ptr().cast::<f32>(), to[x..x + GROUP].as_mut_ptr());
+                transpose4(from, GROUP, to.cast(), 4);
+                transpose4(from.add(4), GROUP, to.add(4).cast(), 4);
             }
+            let mut lanes = [0.0; GROUP];
+            S::store(lanes.as_mut_ptr(), largest);
+            self.largest = lanes.into_iter().fold(0.0, f32::max);
         }
-        self.largest = largest;
+        to[count..].fill([0.0; 4]);
     }
 
     /// Has no points in row `y`: it is outside the image.
     pub fn read_none(&mut self, y: usize) {
         let row = self.row(y);
         self.points[row].fill([0.0; 4]);
-    }
-
-    /// The largest magnitude of a coordinate read so far.
-    pub fn largest(&self) -> f32 {
-        self.largest[0].max(self.largest[1]).max(self.largest[2])
     }
 
     /// Sums row `y`; the rows around it have been read.
@@ -175,19 +178,6 @@ impl<const N: usize> Rings<N> {
 
     /// The sum over all that was pushed so far, `y` being the last row.
     pub fn total(&self, y: usize) -> [f64; N] {
-        self.sums[self.row(y).end - 2]
-    }
-}
-
-/// Puts a point, or zeros where the mask says that it is missing, and keeps the largest magnitudes.
-#[inline(always)]
-fn put(to: &mut Counted, there: f32, point: [f32; 4], largest: &mut Counted) {
-    let point = [point[0], point[1], point[2], 1.0];
-    for c in 0..4 {
-        to[c] = f32::from_bits(point[c].to_bits() & there.to_bits());
-    }
-    for c in 0..4 {
-        let size = to[c].abs();
-        largest[c] = if largest[c] < size { size } else { largest[c] };
+        self.sums[self.row(y).start + self.columns.len()]
     }
 }

@@ -114,13 +114,14 @@ impl Sums<MOMENTS> for CovarianceMatrix {
     }
 }
 
-/// The differences between a pixel's neighbours and whether both are there: x, y, z, count.
+/// The differences between a pixel's neighbours and whether both are there: x, y, z, count. Exact: what cancels in
+/// the sums leaves nothing.
 #[inline(always)]
-fn difference([before, after]: [&Counted; 2]) -> [f32; 4] {
-    let both = before[3] * after[3];
+fn difference([before, after]: [&Counted; 2]) -> [f64; 4] {
+    let both = f64::from(before[3] * after[3]);
     let mut difference = [both; 4];
     for c in 0..3 {
-        difference[c] = (after[c] - before[c]) * both;
+        difference[c] = (f64::from(after[c]) - f64::from(before[c])) * both;
     }
     difference
 }
@@ -157,7 +158,7 @@ impl Channels<8> for Gradients {
     #[inline(always)]
     fn of(&self, _: &Counted, row: [&Counted; 2], column: [&Counted; 2]) -> [f64; 8] {
         let ([a, b, c, d], [e, f, g, h]) = (difference(row), difference(column));
-        [a, b, c, d, e, f, g, h].map(f64::from)
+        [a, b, c, d, e, f, g, h]
     }
 }
 
@@ -197,8 +198,10 @@ pub(crate) struct SmoothedDepthChanges;
 impl Channels<4> for SmoothedDepthChanges {
     #[inline(always)]
     fn of(&self, _: &Counted, [left, right]: [&Counted; 2], [up, down]: [&Counted; 2]) -> [f64; 4] {
-        let (row, column) = (left[3] * right[3], up[3] * down[3]);
-        [(right[2] - left[2]) * row, row, (down[2] - up[2]) * column, column].map(f64::from)
+        let row = f64::from(left[3] * right[3]);
+        let column = f64::from(up[3] * down[3]);
+        let difference = |before: f32, after: f32| f64::from(after) - f64::from(before);
+        [difference(left[2], right[2]) * row, row, difference(up[2], down[2]) * column, column]
     }
 }
 
@@ -222,7 +225,7 @@ impl Sums<4> for SmoothedDepthChanges {
             numbers[0][lane][i] = sum[i] as f32;
         }
         for (line, to) in (0..2).zip(&mut numbers[1..]) {
-            let [from, end] = rects.ends[line];
+            let [from, end] = &rects.ends[line];
             let (a, b) = (&points[from[lane] as usize], &points[end[lane] as usize]);
             let both = a[3] * b[3];
             to[lane] = [b[0] - a[0], b[1] - a[1], rects.spans[line][lane], both];

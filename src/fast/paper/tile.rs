@@ -61,7 +61,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 rings.push(method, next);
                 next += 1;
             }
-            let error = M::error(rings.total(next - 1), count, rings.largest());
+            let error = M::error(rings.total(next - 1), count, rings.largest);
             // SAFETY: as the caller's.
             unsafe { self.row::<S, M, N>(rings, sink, y, error) };
         }
@@ -106,7 +106,10 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 let place = Place { image, x, y, left, stride, rows };
                 let rects = Rects::new::<S>(&place, of_row, M::INNER, M::ENDS);
                 let mut numbers = M::Numbers::default();
-                for lane in Bits(windows) {
+                let mut todo = windows;
+                while todo != 0 {
+                    let lane = todo.trailing_zeros() as usize % GROUP;
+                    todo &= todo - 1;
                     let [a, b, c, d] =
                         rects.corners.each_ref().map(|i| sums.get_unchecked(i[lane] as usize));
                     let mut sum = [0.0; N];

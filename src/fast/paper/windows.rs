@@ -286,8 +286,8 @@ unsafe fn radius<S: Simd>(
         let enough = S::and(there, S::mul(S::mul(more, more), S::splat(2.0)));
 
         let mut nearest = S::load(squares);
-        let (mut column, mut distances) = (0, along.chunks_exact(AT_ONCE));
-        while let Some(along) = distances.next() {
+        let mut column = 0;
+        for along in along.chunks_exact(AT_ONCE) {
             if S::bits(S::lt(S::load(along[0].as_ptr()), S::min(nearest, enough))) == 0 {
                 break;
             }

@@ -1,0 +1,416 @@
+//! The estimator's options: a setter for each, which refuses what is out of range and then changes nothing.
+
+use super::boundary::{guard, reference_mut};
+use super::estimator::iine_estimator;
+use crate::{BorderPolicy, Depth, DistanceMetric, Error, Method, Options, PaperOptions, Semantics};
+
+/// Changes one option, after `change` has said that its value is in range.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+unsafe fn set(
+    estimator: *mut iine_estimator,
+    change: impl FnOnce(&mut Options) -> Result<(), Error>,
+) -> i32 {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        change(unsafe { reference_mut(estimator) }?.estimator.options_mut())
+    })
+}
+
+/// As [`set`], for the parameters of the paper's semantics, which are in range or not together.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+unsafe fn set_paper(
+    estimator: *mut iine_estimator,
+    change: impl FnOnce(&mut PaperOptions) -> Result<(), Error>,
+) -> i32 {
+    let change = |options: &mut Options| {
+        let mut paper = options.paper.clone();
+        change(&mut paper)?;
+        paper.check()?;
+        options.paper = paper;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+fn switch(number: i32) -> Result<bool, Error> {
+    match number {
+        0 => Ok(false),
+        1 => Ok(true),
+        _ => Err(Error::OptionValue),
+    }
+}
+
+/// Sets the method: one of IINE_METHOD_*; default IINE_METHOD_AVERAGE_3D_GRADIENT.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_method(
+    estimator: *mut iine_estimator,
+    method: i32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        let known = Method::ALL.into_iter().find(|known| *known as i32 == method);
+        options.method = known.ok_or(Error::OptionValue)?;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// Sets the border policy: one of IINE_BORDER_POLICY_*; default IINE_BORDER_POLICY_IGNORE.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_border_policy(
+    estimator: *mut iine_estimator,
+    border_policy: i32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        let known = BorderPolicy::ALL.into_iter().find(|known| *known as i32 == border_policy);
+        options.border_policy = known.ok_or(Error::OptionValue)?;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// Sets the smoothing size in pixels, the side of the largest window: finite, above 0; default 10.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_normal_smoothing_size(
+    estimator: *mut iine_estimator,
+    normal_smoothing_size: f32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        if !(normal_smoothing_size.is_finite() && normal_smoothing_size > 0.0) {
+            return Err(Error::OptionValue);
+        }
+        options.normal_smoothing_size = normal_smoothing_size;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// Whether a tenth of a pixel's z (signed, in the cloud's unit) is added to its smoothing size: 0 (the default)
+/// or 1.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_depth_dependent_smoothing(
+    estimator: *mut iine_estimator,
+    depth_dependent_smoothing: i32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        options.depth_dependent_smoothing = switch(depth_dependent_smoothing)?;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// Sets the factor of the depth change threshold: two neighbours are a depth change apart if their z differ by
+/// more than 2 * factor * (|z| + 1), in the cloud's unit. Any number; default 0.02.
+///
+/// Errors: IINE_ERROR_NULL_POINTER.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_max_depth_change_factor(
+    estimator: *mut iine_estimator,
+    max_depth_change_factor: f32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        options.max_depth_change_factor = max_depth_change_factor;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// Sets the point that normals are turned towards, in the cloud's coordinates. Any numbers; default (0, 0, 0).
+///
+/// Errors: IINE_ERROR_NULL_POINTER.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_viewpoint(
+    estimator: *mut iine_estimator,
+    x: f32,
+    y: f32,
+    z: f32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        options.viewpoint = [x, y, z];
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// Sets the number of threads: 1 (the default) computes on the calling thread, 0 takes one per core. The result
+/// does not depend on it, bit for bit.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE above 1024.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_threads(
+    estimator: *mut iine_estimator,
+    threads: u32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        if threads > 1024 {
+            return Err(Error::OptionValue);
+        }
+        options.threads = threads as usize;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// Sets whose definition of the windows and sums is followed: one of IINE_SEMANTICS_*; default IINE_SEMANTICS_PCL.
+///
+/// With IINE_SEMANTICS_PAPER the border policy, the smoothing size, depth dependent smoothing and the depth change
+/// factor have no effect, and IINE_METHOD_SIMPLE_3D_GRADIENT is not supported; the iine_estimator_set_paper_*
+/// functions set what takes their place.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_semantics(
+    estimator: *mut iine_estimator,
+    semantics: i32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        let known = Semantics::ALL.into_iter().find(|known| *known as i32 == semantics);
+        options.semantics = known.ok_or(Error::OptionValue)?;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// Sets alpha: the smallest depth change that the sensor can tell at depth d is alpha d^2 (Eq. 4). In 1/unit of
+/// length; finite, above 0; default 0.0028, the paper's for a Kinect and metres. See `iine_alpha_of_sensor`.
+///
+/// Used by IINE_SEMANTICS_PAPER and by crease windows.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_paper_alpha(
+    estimator: *mut iine_estimator,
+    alpha: f32,
+) -> i32 {
+    let change = |paper: &mut PaperOptions| {
+        paper.alpha = alpha;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set_paper(estimator, change) }
+}
+
+/// Sets beta: the radius of the window in pixels is beta alpha d^2 (Eq. 5). In pixels/unit of length; finite,
+/// above 0; default 800: with the default alpha 5 px at 1.5 m, 9 px at 2 m.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_paper_beta(
+    estimator: *mut iine_estimator,
+    beta: f32,
+) -> i32 {
+    let change = |paper: &mut PaperOptions| {
+        paper.beta = beta;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set_paper(estimator, change) }
+}
+
+/// Sets gamma: neighbours whose depths differ by gamma alpha d^2 or more are a depth change apart (Eq. 6). Without
+/// unit; finite, above 0; default 5.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_paper_gamma(
+    estimator: *mut iine_estimator,
+    gamma: f32,
+) -> i32 {
+    let change = |paper: &mut PaperOptions| {
+        paper.gamma = gamma;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set_paper(estimator, change) }
+}
+
+/// Sets the limits of the window's radius, in pixels: where it is below `smallest` there is no window; what the
+/// depth asks for (Eq. 5) is at least `least_depth` and at most `largest`.
+///
+/// 1 <= smallest <= least_depth <= largest <= 1000; default 2, 5, 20.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_paper_radii(
+    estimator: *mut iine_estimator,
+    smallest: u32,
+    least_depth: u32,
+    largest: u32,
+) -> i32 {
+    let change = |paper: &mut PaperOptions| {
+        paper.smallest_radius = smallest;
+        paper.least_depth_radius = least_depth;
+        paper.largest_radius = largest;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set_paper(estimator, change) }
+}
+
+/// Sets how the distance to the nearest depth change is measured with IINE_SEMANTICS_PAPER: one of
+/// IINE_DISTANCE_METRIC_*; default IINE_DISTANCE_METRIC_EUCLIDEAN.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_paper_distance_metric(
+    estimator: *mut iine_estimator,
+    distance_metric: i32,
+) -> i32 {
+    let change = |paper: &mut PaperOptions| {
+        let known = DistanceMetric::ALL.into_iter().find(|known| *known as i32 == distance_metric);
+        paper.distance_metric = known.ok_or(Error::OptionValue)?;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set_paper(estimator, change) }
+}
+
+/// Sets what a point's depth is with IINE_SEMANTICS_PAPER: one of IINE_DEPTH_*; default IINE_DEPTH_Z.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_paper_depth(
+    estimator: *mut iine_estimator,
+    depth: i32,
+) -> i32 {
+    let change = |paper: &mut PaperOptions| {
+        let known = Depth::ALL.into_iter().find(|known| *known as i32 == depth);
+        paper.depth = known.ok_or(Error::OptionValue)?;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set_paper(estimator, change) }
+}
+
+/// Whether points at (0, 0, 0) are missing, as LiDARs and some depth cameras write them: 0 (the default) or 1.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_zero_is_missing(
+    estimator: *mut iine_estimator,
+    zero_is_missing: i32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        options.zero_is_missing = switch(zero_is_missing)?;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// Whether pixels near a depth change get a window of their own side, and with it a normal every pixel that has
+/// two neighbours on its surface not in line with it: 0 (the default) or 1. With either semantics.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_one_sided_windows(
+    estimator: *mut iine_estimator,
+    one_sided_windows: i32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        options.one_sided_windows = switch(one_sided_windows)?;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// Whether a second pass moves windows off the places where the normals of the first vary strongly, so that edges
+/// without a depth change stay sharp: 0 (the default) or 1. With either semantics; takes the sensor's alpha from
+/// `iine_estimator_set_paper_alpha`.
+///
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
+///
+/// # Safety
+/// `estimator` is NULL or a live estimator that no other thread uses.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn iine_estimator_set_crease_windows(
+    estimator: *mut iine_estimator,
+    crease_windows: i32,
+) -> i32 {
+    let change = |options: &mut Options| {
+        options.crease_windows = switch(crease_windows)?;
+        Ok(())
+    };
+    // SAFETY: promised by the caller.
+    unsafe { set(estimator, change) }
+}
+
+/// The alpha of a stereo or structured light sensor: disparity_step / (focal * baseline), as its depth is
+/// focal * baseline / disparity.
+///
+/// `disparity_step` and `focal` in pixels, `baseline` in the cloud's unit of length; all finite and above 0, else
+/// the result is a number that `iine_estimator_set_paper_alpha` may refuse. A Kinect's 1/8 px, 580 px and 0.075 m
+/// give 0.0029.
+#[unsafe(no_mangle)]
+pub extern "C" fn iine_alpha_of_sensor(disparity_step: f32, focal: f32, baseline: f32) -> f32 {
+    PaperOptions::alpha_of_sensor(disparity_step, focal, baseline)
+}

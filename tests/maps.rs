@@ -1,0 +1,219 @@
+//! The maps behind the normals, and what the options that are not PCL's say about missing points: the same everywhere.
+
+mod clouds;
+
+use clouds::{Cloud, Kind, assert_same_bits, compute, methods, options};
+use iine::{BorderPolicy, Error, Estimator, Isa, Maps, Method, Normals, Options, Semantics};
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+
+/// Every map that a combination of options has, written.
+fn all_maps(estimator: &mut Estimator, cloud: &Cloud) -> Vec<f32> {
+    let pixels = cloud.points.len();
+    let [mut radii, mut distances, mut areas] = [(); 3].map(|()| vec![0.0; pixels]);
+    let (mut changes, mut eigenvalues) = (vec![7; pixels], vec![0.0; 3 * pixels]);
+    let is_paper = estimator.options().semantics == Semantics::Paper;
+    let has_eigenvalues = estimator.options().method == Method::CovarianceMatrix;
+    let mut maps = Maps {
+        depth_radii: is_paper.then_some(&mut radii[..]),
+        depth_changes: Some(&mut changes),
+        distances: Some(&mut distances),
+        smoothing_areas: Some(&mut areas),
+        eigenvalues: has_eigenvalues.then_some(&mut eigenvalues[..]),
+    };
+    estimator.compute_maps(&cloud.view(), &mut maps).unwrap();
+    let changes = changes.into_iter().map(f32::from).collect();
+    [radii, changes, distances, areas, eigenvalues].concat()
+}
+
+fn bits(values: &[f32]) -> Vec<u32> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
+#[test]
+fn eigenvalues_of_pcls_windows() {
+    for (seed, kind) in (0..).zip(Kind::ALL) {
+        let cloud = Cloud::new(kind, 64, 48, seed);
+        for policy in BorderPolicy::ALL {
+            let mut estimator =
+                Estimator::new(options((Method::CovarianceMatrix, policy), 7.0, false));
+            let pixels = cloud.points.len();
+            let (mut areas, mut eigenvalues) = (vec![0.0; pixels], vec![0.0; 3 * pixels]);
+            let mut maps = Maps {
+                smoothing_areas: Some(&mut areas),
+                eigenvalues: Some(&mut eigenvalues),
+                ..Maps::default()
+            };
+            estimator.compute_maps(&cloud.view(), &mut maps).unwrap();
+            let normals = compute(&mut estimator, &cloud);
+            let mut compared = 0;
+            for (at, values) in eigenvalues.chunks_exact(3).enumerate() {
+                let side = areas[at] as usize;
+                if side == 0 {
+                    assert!(values.iter().all(|value| value.is_nan()));
+                    continue;
+                }
+                assert!(0.0 <= values[0] && values[0] <= values[1] && values[1] <= values[2]);
+                // The curvature is the smallest over their sum.
+                let trace = values.iter().map(|value| f64::from(*value)).sum::<f64>();
+                let curvature = f64::from(normals[at][3]);
+                assert!((f64::from(values[0]) - curvature * trace).abs() <= 1e-5 * trace);
+
+                let (x, y) = (at % cloud.width, at / cloud.width);
+                let is_inside = |at: usize, size: usize| at >= side && at + side < size;
+                if !(is_inside(x, cloud.width) && is_inside(y, cloud.height)) {
+                    continue;
+                }
+                let (left, top) = (x - side / 2, y - side / 2);
+                let points: Vec<Vector3<f64>> = (top..top + side)
+                    .flat_map(|y| (left..left + side).map(move |x| y * cloud.width + x))
+                    .map(|at| Vector3::from(cloud.points[at].map(f64::from)))
+                    .filter(|point| point.iter().all(|c| c.is_finite()))
+                    .collect();
+                let count = points.len() as f64;
+                let mean = points.iter().sum::<Vector3<f64>>() / count;
+                let matrix: Matrix3<f64> =
+                    points.iter().map(|p| (p - mean) * (p - mean).transpose() / count).sum();
+                let mut expected = SymmetricEigen::new(matrix).eigenvalues;
+                expected.as_mut_slice().sort_by(f64::total_cmp);
+                for (found, expected) in values.iter().zip(expected.iter()) {
+                    let difference = (f64::from(*found) - expected).abs();
+                    let allowed = 1e-6 * expected.abs() + 1e-10 * matrix.trace();
+                    assert!(difference <= allowed, "{kind:?} at {x},{y}: {found}, not {expected}");
+                }
+                compared += 1;
+            }
+            assert!(compared > 100, "{kind:?}: {compared}");
+        }
+    }
+}
+
+#[test]
+fn maps_that_do_not_go_together_are_refused() {
+    let cloud = Cloud::new(Kind::Noisy, 12, 9, 1);
+    for method in Method::ALL {
+        for semantics in Semantics::ALL {
+            let mut options = Options::default();
+            (options.method, options.semantics) = (method, semantics);
+            let mut estimator = Estimator::new(options);
+            let mut check = |radii: usize, eigenvalues: usize, expected| {
+                let (mut radii, mut eigenvalues) = (vec![7.0; radii], vec![7.0; eigenvalues]);
+                let mut distances = [7.0; 12 * 9];
+                let mut maps = Maps {
+                    depth_radii: (!radii.is_empty()).then_some(&mut radii[..]),
+                    distances: Some(&mut distances),
+                    eigenvalues: (!eigenvalues.is_empty()).then_some(&mut eigenvalues[..]),
+                    ..Maps::default()
+                };
+                let found = estimator.compute_maps(&cloud.view(), &mut maps);
+                assert_eq!(found, expected, "{method:?} {semantics:?}");
+                if expected.is_err() {
+                    assert!(
+                        [&radii, &eigenvalues, &distances[..]].concat().iter().all(|v| *v == 7.0)
+                    );
+                }
+            };
+            let is_paper = semantics == Semantics::Paper;
+            let is_known = !(is_paper && method == Method::Simple3DGradient);
+            let when = |ok: bool| if ok { Ok(()) } else { Err(Error::Unsupported) };
+            check(0, 0, when(is_known));
+            check(12 * 9, 0, when(is_known && is_paper));
+            check(0, 3 * 12 * 9, when(method == Method::CovarianceMatrix));
+            if is_known {
+                check(0, 12 * 9, Err(Error::Size));
+                check(12 * 9 - 1, 0, Err(Error::Size));
+            }
+        }
+    }
+}
+
+#[test]
+fn zeros_that_are_missing_are_as_nan() {
+    for seed in 0..6 {
+        let zeros = Cloud::new(Kind::Zeros, 41, 33, seed);
+        let mut nans = zeros.clone();
+        let is_zero = |point: &&mut [f32; 3]| **point == [0.0; 3];
+        let changed = nans.points.iter_mut().filter(is_zero).map(|p| *p = [f32::NAN; 3]).count();
+        assert!(changed > 10);
+        for method in methods() {
+            for semantics in Semantics::ALL {
+                for [one_sided, creases] in [[false, false], [true, false], [true, true]] {
+                    let mut options = options(method, 6.0, false);
+                    options.semantics = semantics;
+                    (options.one_sided_windows, options.crease_windows) = (one_sided, creases);
+                    options.zero_is_missing = true;
+                    if options.check().is_err() {
+                        continue;
+                    }
+                    let what = format!("{options:?}");
+                    let mut missing = Estimator::with_isa(options.clone(), Isa::Scalar);
+                    let found = compute(&mut missing, &zeros);
+                    let maps = all_maps(&mut missing, &zeros);
+                    let window = window(&mut missing, &zeros);
+
+                    options.zero_is_missing = false;
+                    let mut plain = Estimator::with_isa(options, Isa::Scalar);
+                    let expected = compute(&mut plain, &nans);
+                    assert_same_bits(&found, &expected, zeros.width, &what);
+                    assert_eq!(bits(&maps), bits(&all_maps(&mut plain, &nans)), "{what}");
+                    // A pixel that is a zero itself has a side towards the viewpoint, one that is NaN has none.
+                    let expected = self::window(&mut plain, &nans);
+                    let same = |sign: f32| {
+                        (0..3).all(|i| window[i].to_bits() == (sign * expected[i]).to_bits())
+                            || window[0].is_nan() && expected[0].is_nan()
+                    };
+                    assert!(same(1.0) || same(-1.0), "{what}: {window:?}");
+                    assert_ne!(bits(&maps), bits(&all_maps(&mut plain, &zeros)), "zeros do matter");
+                }
+            }
+        }
+    }
+}
+
+/// One pixel's normal over a window of 21 x 17.
+fn window(estimator: &mut Estimator, cloud: &Cloud) -> [f32; 4] {
+    let mut found = [7.0; 4];
+    let mut normal = Normals::interleaved(&mut found, 1, 1, 4, 0, Some(3)).unwrap();
+    estimator.compute_window(&cloud.view(), (20, 16), (21, 17), &mut normal).unwrap();
+    found
+}
+
+#[test]
+fn windows_of_the_papers_methods() {
+    let cloud = Cloud::new(Kind::NanPixels, 41, 33, 2);
+    for method in [Method::CovarianceMatrix, Method::Average3DGradient, Method::AverageDepthChange]
+    {
+        let mut options = Options::default();
+        (options.method, options.semantics) = (method, Semantics::Paper);
+        let mut estimator = Estimator::new(options);
+        let pixels = cloud.points.len();
+        let mut areas = vec![0.0; pixels];
+        let mut maps = Maps { smoothing_areas: Some(&mut areas), ..Maps::default() };
+        estimator.compute_maps(&cloud.view(), &mut maps).unwrap();
+        let whole = compute(&mut estimator, &cloud);
+        let mut compared = 0;
+        for at in (0..pixels).filter(|at| areas[*at] > 0.0) {
+            let side = 2 * areas[at] as u32 + 1;
+            let pixel = (at % cloud.width, at / cloud.width);
+            let mut found = [7.0; 4];
+            let mut normal = Normals::interleaved(&mut found, 1, 1, 4, 0, Some(3)).unwrap();
+            estimator.compute_window(&cloud.view(), pixel, (side, side), &mut normal).unwrap();
+            for (a, b) in found.iter().zip(whole[at]) {
+                assert!((a - b).abs() < 1e-5 || a.is_nan() && b.is_nan(), "{method:?} {pixel:?}");
+            }
+            compared += 1;
+        }
+        assert!(compared > pixels / 2);
+        for size in [(0, 0), (0, 5), (5, 0), (1, 1)] {
+            for pixel in [(0, 0), (40, 32)] {
+                let mut found = [7.0; 4];
+                let mut normal = Normals::interleaved(&mut found, 1, 1, 4, 0, Some(3)).unwrap();
+                estimator.compute_window(&cloud.view(), pixel, size, &mut normal).unwrap();
+                assert!(found.iter().all(|c| c.is_nan()), "{method:?} {size:?}: {found:?}");
+            }
+        }
+        let mut found = [7.0; 4];
+        let mut normal = Normals::interleaved(&mut found, 1, 1, 4, 0, Some(3)).unwrap();
+        estimator.compute_window(&cloud.view(), (3, 4), (u32::MAX, u32::MAX), &mut normal).unwrap();
+        assert!(found[..3].iter().all(|c| c.is_finite()));
+    }
+}
