@@ -273,7 +273,8 @@ impl<'a> Points<'a> {
         #[cfg(target_arch = "x86_64")]
         if y < self.grid.height {
             use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-            let (start, end) = (self.grid.offset(columns.start, y), self.grid.offset(columns.end, y));
+            let (start, end) =
+                (self.grid.offset(columns.start, y), self.grid.offset(columns.end, y));
             for line in (start..end).step_by(LINE) {
                 // SAFETY: a prefetch reads and writes nothing, whatever the address.
                 unsafe { _mm_prefetch::<_MM_HINT_T0>(self.z.wrapping_byte_add(line).cast()) };

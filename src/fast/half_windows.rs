@@ -3,6 +3,7 @@
 use super::arithmetic::{Doubles, Floats, cross, dot};
 use super::planes::{Frame, MARGIN, Planes, grow};
 use super::tile::{Found, Sums};
+use crate::cloud::Points;
 use crate::simd::twice::Twice;
 use crate::simd::{GROUP, Simd};
 use crate::window::Image;
@@ -223,6 +224,10 @@ impl Sums for HalfWindows {
         }
     }
 
+    fn afresh(_: &Points, _: &Image, _: (usize, usize), _: usize) -> Option<Self::Of1> {
+        None
+    }
+
     #[inline(always)]
     unsafe fn estimate<S: Simd>(
         &self,
@@ -230,6 +235,7 @@ impl Sums for HalfWindows {
         tangents: &Self::Of8<S>,
         sides: S::F,
         _lanes: u32,
+        _fresh: u32,
     ) -> Found<S> {
         let [h, v] = *tangents;
         // SAFETY: as the caller's.

@@ -4,6 +4,7 @@
 use super::arithmetic::{Doubles, Floats, dot};
 use super::planes::{Frame, MARGIN, Planes, grow};
 use super::tile::{Found, Sums};
+use crate::cloud::Points;
 use crate::simd::twice::Twice;
 use crate::simd::{GROUP, Simd};
 use crate::window::Image;
@@ -218,6 +219,30 @@ impl Sums for Moments {
         }
     }
 
+    #[cold]
+    fn afresh(
+        points: &Points,
+        image: &Image,
+        (x, y): (usize, usize),
+        side: usize,
+    ) -> Option<Self::Of1> {
+        let origin = points.at(x, y).map(f64::from);
+        let half = (side / 2) as isize;
+        let mut moments = WindowMoments { sums: [0.0; CHANNELS], count: 0.0 };
+        for rect in image.rects((x as isize - half, y as isize - half), (side, side)) {
+            for (y, x) in rect.y.clone().flat_map(|y| rect.x.clone().map(move |x| (y, x))) {
+                let point = points.at(x, y);
+                let [x, y, z] = [0, 1, 2].map(|c| f64::from(point[c]) - origin[c]);
+                let of_point = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
+                for (sum, value) in moments.sums.iter_mut().zip(of_point) {
+                    *sum += value;
+                }
+                moments.count += 1.0;
+            }
+        }
+        Some(moments)
+    }
+
     #[inline(always)]
     unsafe fn estimate<S: Simd>(
         &self,
@@ -225,15 +250,16 @@ impl Sums for Moments {
         moments: &Self::Of8<S>,
         _sides: S::F,
         lanes: u32,
+        fresh: u32,
     ) -> Found<S> {
         // SAFETY: as the caller's.
-        unsafe { plane(moments, self.error, lanes) }
+        unsafe { plane(moments, self.error, lanes, fresh) }
     }
 }
 
 /// The eigenvector of the smallest eigenvalue: the least root of the characteristic polynomial by one step of
-/// Laguerre's method from 0 and Newton steps, then a column of the adjugate. `error` is what the sums' rounding errors
-/// stay below; other lanes than `lanes` mean nothing.
+/// Laguerre's method from 0 and Newton steps, then a column of the adjugate. `error` is what the rounding errors of the sums
+/// of all but `fresh` lanes stay below; other lanes than `lanes` mean nothing.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
@@ -242,6 +268,7 @@ pub(crate) unsafe fn plane<S: Simd>(
     moments: &WindowMoments<Doubles<S>>,
     error: f64,
     lanes: u32,
+    fresh: u32,
 ) -> Found<S> {
     // SAFETY: as the caller's.
     unsafe {
@@ -298,7 +325,8 @@ pub(crate) unsafe fn plane<S: Simd>(
         let least = Doubles::splat(DOUBT_SUMS * error);
         // Where the points lie on a line, the steps may end at the largest eigenvalue instead.
         let is_smallest = value.lt(Doubles::splat(1.0 / 3.0));
-        let sure = Doubles::splat(DOUBT_PLANE).lt(slope) & least.lt(slope * trace) & is_smallest;
+        let sums = least.lt(slope * trace) | fresh;
+        let sure = Doubles::splat(DOUBT_PLANE).lt(slope) & sums & is_smallest;
         Found {
             normal: [n[0] * scale, n[1] * scale, n[2] * scale],
             curvature: value.narrow(),

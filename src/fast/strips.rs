@@ -8,6 +8,7 @@
 use super::arithmetic::{Floats, cross, dot};
 use super::planes::{Frame, MARGIN, Planes, grow};
 use super::tile::{Found, Sums};
+use crate::cloud::Points;
 use crate::simd::twice::Twice;
 use crate::simd::{GROUP, Simd};
 use crate::window::Image;
@@ -229,6 +230,10 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
         }
     }
 
+    fn afresh(_: &Points, _: &Image, _: (usize, usize), _: usize) -> Option<Self::Of1> {
+        None
+    }
+
     #[inline(always)]
     unsafe fn estimate<S: Simd>(
         &self,
@@ -236,6 +241,7 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
         sums: &Self::Of8<S>,
         sides: S::F,
         _lanes: u32,
+        _fresh: u32,
     ) -> Found<S> {
         // SAFETY: as the caller's.
         unsafe {

@@ -93,8 +93,17 @@ pub(crate) trait Sums {
     /// As [`Sums::push`].
     unsafe fn put<S: Simd>(sums: &mut Self::Of8<S>, lane: usize, one: Self::Of1);
 
+    /// The sums of one window from its points, without the rings' rounding; none if that is left to the plain form.
+    fn afresh(
+        points: &Points,
+        image: &Image,
+        pixel: (usize, usize),
+        side: usize,
+    ) -> Option<Self::Of1>;
+
     /// The estimates from the sums; `sides` are the sides of the windows. Only these `lanes` have sums: the others
-    /// hold anything, and may not have a say in these lanes' estimates.
+    /// hold anything, and may not have a say in these lanes' estimates. Those of `fresh` lanes are from
+    /// [`Sums::afresh`].
     ///
     /// # Safety
     /// As [`Sums::push`].
@@ -104,6 +113,7 @@ pub(crate) trait Sums {
         sums: &Self::Of8<S>,
         sides: S::F,
         lanes: u32,
+        fresh: u32,
     ) -> Found<S>;
 }
 
@@ -251,9 +261,18 @@ impl Tile<'_> {
                 let first = self.group::<S, M>(frame, planes, sums, sides, &pair[0]);
                 let second = self.group::<S, M>(frame, planes, sums, sides, &pair[1]);
                 let group_sides = [pair[0].sides, pair[1].sides];
-                let of16 = M::pair::<S>(first.0, second.0);
+                let mut of16 = M::pair::<S>(first.0, second.0);
                 let left = first.1 | second.1 << GROUP;
-                let found = sums.estimate::<Twice<S>>(frame, &of16, group_sides, windows & !left);
+                let (mut fresh, lanes) = (0, windows & !left);
+                let found = loop {
+                    let found = sums.estimate::<Twice<S>>(frame, &of16, group_sides, lanes, fresh);
+                    let again = found.doubtful & lanes & !fresh;
+                    let tried = self.afresh::<S, M>(&mut of16, row, pair[0].x, y, again);
+                    if tried == 0 {
+                        break found;
+                    }
+                    fresh |= tried;
+                };
                 let plain = left | found.doubtful & windows;
                 for g in 0..2 {
                     let group = &pair[g];
@@ -283,6 +302,31 @@ impl Tile<'_> {
                 }
             }
         }
+    }
+
+    /// Replaces the sums of some lanes by those from the points; returns which.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn afresh<S: Simd, M: Sums>(
+        &self,
+        of16: &mut M::Of8<Twice<S>>,
+        sides: &[f32],
+        x: usize,
+        y: usize,
+        lanes: u32,
+    ) -> u32 {
+        let mut tried = 0;
+        for lane in Bits(lanes) {
+            let side = sides[x + lane] as usize;
+            if let Some(one) = M::afresh(self.points, self.image, (x + lane, y), side) {
+                // SAFETY: as the caller's.
+                unsafe { M::put::<Twice<S>>(of16, lane, one) };
+                tried |= 1 << lane;
+            }
+        }
+        tried
     }
 
     /// A group that needs no sums: without windows, or whose windows are all left to the plain form.

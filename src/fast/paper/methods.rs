@@ -7,6 +7,7 @@ use crate::fast::arithmetic::{Doubles, Floats, cross, dot};
 use crate::fast::lanes::transpose4;
 use crate::fast::moments::{WindowMoments, plane};
 use crate::fast::tile::Found;
+use crate::paper::{CleanPoints, Rect};
 use crate::simd::{GROUP, Simd};
 
 /// A method's sums and normals.
@@ -36,7 +37,7 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
     /// and no coordinate is above `largest`.
     fn error(total: [f64; N], count: usize, largest: f32) -> f64;
 
-    /// The normals.
+    /// The normals; only of these `lanes` there are numbers, of the `fresh` ones from [`Sums::afresh`].
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
@@ -45,7 +46,16 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
         rects: &Rects,
         error: f64,
         lanes: u32,
+        fresh: u32,
     ) -> Found<S>;
+
+    /// Takes one window's sums from its points, without the rings' rounding; false if that is left to the plain form.
+    fn afresh(
+        numbers: &mut Self::Numbers,
+        lane: usize,
+        points: &impl CleanPoints,
+        rect: &Rect,
+    ) -> bool;
 }
 
 /// A few units in the last place of a double.
@@ -101,6 +111,7 @@ impl Sums<MOMENTS> for CovarianceMatrix {
         _: &Rects,
         error: f64,
         lanes: u32,
+        fresh: u32,
     ) -> Found<S> {
         // SAFETY: as the caller's; each number is there for a whole group.
         unsafe {
@@ -109,8 +120,28 @@ impl Sums<MOMENTS> for CovarianceMatrix {
                 sums[c] = Doubles(S::load_d(numbers[i].as_ptr()));
             }
             let count = Doubles(S::load_d(numbers[3].as_ptr()));
-            plane(&WindowMoments { sums, count }, error, lanes)
+            plane(&WindowMoments { sums, count }, error, lanes, fresh)
         }
+    }
+
+    #[cold]
+    fn afresh(
+        numbers: &mut Self::Numbers,
+        lane: usize,
+        points: &impl CleanPoints,
+        rect: &Rect,
+    ) -> bool {
+        let Some(origin) = points.finite(rect).next() else { return false };
+        let mut moments = [0.0; MOMENTS];
+        for point in points.finite(rect) {
+            let [x, y, z] = [0, 1, 2].map(|c| point[c] - origin[c]);
+            let of_point = [x, y, z, 1.0, x * x, x * y, x * z, y * y, y * z, z * z];
+            for (sum, value) in moments.iter_mut().zip(of_point) {
+                *sum += value;
+            }
+        }
+        Self::take(numbers, lane, moments, &Rects::default(), &[]);
+        true
     }
 }
 
@@ -177,12 +208,22 @@ impl Sums<8> for Gradients {
         }
     }
 
+    fn afresh(_: &mut Self::Numbers, _: usize, _: &impl CleanPoints, _: &Rect) -> bool {
+        false
+    }
+
     fn error(_: [f64; 8], count: usize, largest: f32) -> f64 {
         error_of_differences(count, largest)
     }
 
     #[inline(always)]
-    unsafe fn normals<S: Simd>(numbers: &[Fours; 2], _: &Rects, error: f64, _: u32) -> Found<S> {
+    unsafe fn normals<S: Simd>(
+        numbers: &[Fours; 2],
+        _: &Rects,
+        error: f64,
+        _: u32,
+        _: u32,
+    ) -> Found<S> {
         // SAFETY: as the caller's.
         unsafe {
             let [hx, hy, hz, _] = by_number::<S>(&numbers[0]);
@@ -235,12 +276,22 @@ impl Sums<4> for SmoothedDepthChanges {
         }
     }
 
+    fn afresh(_: &mut Self::Numbers, _: usize, _: &impl CleanPoints, _: &Rect) -> bool {
+        false
+    }
+
     fn error(_: [f64; 4], count: usize, largest: f32) -> f64 {
         error_of_differences(count, largest)
     }
 
     #[inline(always)]
-    unsafe fn normals<S: Simd>(numbers: &[Fours; 3], _: &Rects, error: f64, _: u32) -> Found<S> {
+    unsafe fn normals<S: Simd>(
+        numbers: &[Fours; 3],
+        _: &Rects,
+        error: f64,
+        _: u32,
+        _: u32,
+    ) -> Found<S> {
         // SAFETY: as the caller's.
         unsafe {
             let [h, h_count, v, v_count] = by_number::<S>(&numbers[0]);
@@ -263,6 +314,9 @@ const DOUBT_SUMS: f64 = 1e5;
 /// And where floats could turn it by more than 1e-5: (sine of the angle between the tangents)^2 < 1e-4.
 const DOUBT_SINE: f32 = 1e-4;
 
+/// And where their squares come near the smallest floats.
+const DOUBT_TINY: f32 = 1e-30;
+
 /// The directions across horizontal and vertical tangents.
 ///
 /// # Safety
@@ -280,7 +334,7 @@ unsafe fn across<S: Simd>(h: [Floats<S>; 3], v: [Floats<S>; 3], error: f64) -> F
         Found {
             normal: [n[0] * scale, n[1] * scale, n[2] * scale],
             curvature: Floats::splat(f32::NAN),
-            doubtful: !rounding.max(sine).lt(n2),
+            doubtful: !rounding.max(sine).max(Floats::splat(DOUBT_TINY)).lt(n2),
         }
     }
 }

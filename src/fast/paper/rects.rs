@@ -20,6 +20,7 @@ pub(crate) struct Place {
 }
 
 /// Indices of the elements that eight windows need.
+#[derive(Default)]
 pub(crate) struct Rects {
     /// Of the sums up to the windows' upper left, upper right, lower left and lower right corners.
     pub corners: [Indices; 4],
@@ -42,13 +43,7 @@ impl Rects {
     /// The processor has the instruction set of `S`. Indices are below 2^24.
     #[inline(always)]
     pub unsafe fn new<S: Simd>(place: &Place, radii: S::F, inner: bool, ends: bool) -> Self {
-        let mut rects = Rects {
-            corners: [[0; GROUP]; 4],
-            ends: [[[0; GROUP]; 2]; 2],
-            spans: [[0.0; GROUP]; 2],
-            stride: place.stride,
-            rows: place.rows,
-        };
+        let mut rects = Rects { stride: place.stride, rows: place.rows, ..Rects::default() };
         // SAFETY: as the caller's; floats hold indices exactly.
         unsafe {
             let one = S::splat(1.0);

@@ -92,6 +92,8 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let (left, stride, rows) = (rings.left(), rings.stride(), rings.rows);
         let (points, sums) = rings.parts();
         let radii = (self.row)(y).1;
+        let cleaned =
+            Cleaned { points: self.points, zero_is_missing: self.options.zero_is_missing };
         for x in self.columns.clone().step_by(GROUP) {
             let count = (self.columns.end - x).min(GROUP);
             // SAFETY: as the caller's; a row of radii is readable up to a whole group, and the rings hold what the
@@ -118,7 +120,21 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                     }
                     M::take(&mut numbers, lane, sum, &rects, points);
                 }
-                let found = M::normals::<S>(&numbers, &rects, error, windows);
+                let mut fresh = 0;
+                let found = loop {
+                    let found = M::normals::<S>(&numbers, &rects, error, windows, fresh);
+                    let mut tried = 0;
+                    for lane in Bits(found.doubtful & windows & !fresh) {
+                        let radius = radii[x + lane] as usize;
+                        let rect = window((x + lane, y), radius, image[0], image[1]);
+                        let taken = M::afresh(&mut numbers, lane, &cleaned, &rect);
+                        tried |= u32::from(taken) << lane;
+                    }
+                    if tried == 0 {
+                        break found;
+                    }
+                    fresh |= tried;
+                };
                 let plain = found.doubtful & windows;
                 let [px, py, pz, _] = by_number::<S>(rings.eight(x, y));
                 let viewpoint = self.options.viewpoint;
