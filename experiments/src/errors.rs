@@ -17,6 +17,12 @@ impl Score {
         self.angles.iter().map(|angle| f64::from(*angle)).sum::<f64>() / self.angles.len() as f64
     }
 
+    /// Mean angle in degrees between the lines of the normals, 0 to 90; NaN if there is no normal.
+    pub fn folded(&self) -> f64 {
+        let fold = |angle: &f32| f64::from(angle.min(180.0 - angle));
+        self.angles.iter().map(fold).sum::<f64>() / self.angles.len() as f64
+    }
+
     /// Median angle in degrees; NaN if there is no normal.
     pub fn median(&self) -> f64 {
         let mut angles = self.angles.clone();
@@ -36,7 +42,7 @@ impl Score {
     }
 }
 
-/// The angle between two unit normals in degrees, 0 to 180.
+/// The angle between two normals of any length in degrees, 0 to 180.
 pub fn angle(a: [f32; 3], b: [f32; 3]) -> f32 {
     let (a, b) = (a.map(f64::from), b.map(f64::from));
     let cross = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -44,17 +50,27 @@ pub fn angle(a: [f32; 3], b: [f32; 3]) -> f32 {
     sine.atan2(a[0] * b[0] + a[1] * b[1] + a[2] * b[2]).to_degrees() as f32
 }
 
-/// The scores of normals in the bands of [`iine_scenes::Band::ALL`].
-pub fn by_band(frame: &Frame, distances: &Distances, normals: &[[f32; 3]]) -> [Score; 3] {
+/// The normal turned to the camera, which is at the origin.
+pub fn towards_camera(normal: [f32; 3], point: [f32; 3]) -> [f32; 3] {
+    let dot: f32 = normal.iter().zip(point).map(|(n, p)| n * p).sum();
+    if dot > 0.0 { normal.map(|c| -c) } else { normal }
+}
+
+/// The scores of normals at some pixels in the bands of [`iine_scenes::Band::ALL`]. Whatever is finite and not zero
+/// counts as a normal.
+pub fn by_band(
+    frame: &Frame,
+    distances: &Distances,
+    normals: &[[f32; 3]],
+    pixels: impl Iterator<Item = usize>,
+) -> [Score; 3] {
     let mut scores = [(); 3].map(|()| Score::default());
-    for (at, normal) in normals.iter().enumerate() {
-        if frame.points[at][2].is_nan() {
-            continue;
-        }
+    for at in pixels.filter(|at| !frame.points[*at][2].is_nan()) {
+        let normal = normals[at];
         let score = &mut scores[distances.band(at) as usize];
         score.points += 1;
-        if !normal[0].is_nan() {
-            score.angles.push(angle(*normal, frame.normals[at]));
+        if normal.iter().all(|c| c.is_finite()) && normal != [0.0; 3] {
+            score.angles.push(angle(normal, frame.normals[at]));
         }
     }
     scores

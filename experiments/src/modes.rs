@@ -42,6 +42,24 @@ impl Mode {
         Mode { name, options }
     }
 
+    /// Every method of either semantics, plain and with the extras.
+    pub fn all() -> Vec<Mode> {
+        let mut modes = Vec::new();
+        for semantics in Semantics::ALL {
+            for method in Method::ALL {
+                if semantics == Semantics::Paper && method == Method::Simple3DGradient {
+                    continue; // not in the paper
+                }
+                for one_sided in [false, true] {
+                    for creases in [false, true] {
+                        modes.push(Mode::new(semantics, method, one_sided, creases));
+                    }
+                }
+            }
+        }
+        modes
+    }
+
     /// Normals of an organized cloud, row by row; NaN where there is none.
     ///
     /// Errors: as [`Estimator::compute`].

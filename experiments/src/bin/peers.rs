@@ -1,0 +1,129 @@
+//! How accurate iine is beside other libraries; scripts/peers runs the steps.
+//!
+//! usage: peers scenes                 the names of the scenes
+//!        peers clouds SCENE FOLDER    writes the scene with every noise, for the peers
+//!        peers scores SCENE FOLDER    prints the scores of our modes, and of the normals that the peers wrote
+//!        peers report SCORES.csv      prints the tables of docs/accuracy.md
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use iine_experiments::errors::{Score, by_band, towards_camera};
+use iine_experiments::modes::Mode;
+use iine_experiments::ranking::OURS;
+use iine_experiments::table::Row;
+use iine_experiments::{exchange, parallel, ranking, table};
+use iine_scenes::{Camera, Distances, Frame, Noise, Random, SCENES, scene};
+
+/// The noise models, and the seeds of each.
+const NOISES: [(&str, &[u64]); 3] = [("none", &[1]), ("nguyen", &[1]), ("khoshelham", &[1])];
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let done = match arguments[..] {
+        ["scenes"] => {
+            println!("{}", SCENES.join("\n"));
+            Ok(())
+        }
+        ["clouds", scene, folder] => clouds(scene, Path::new(folder)),
+        ["scores", scene, folder] => scores(scene, Path::new(folder)),
+        ["report", path] => table::read(path).map(|rows| print!("{}", ranking::report(&rows))),
+        _ => Err(
+            "usage: peers scenes | clouds SCENE FOLDER | scores SCENE FOLDER | report SCORES.csv"
+                .into(),
+        ),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("{message}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// A scene under one noise and one seed.
+struct Noisy {
+    noise: &'static str,
+    file: String,
+    frame: Frame,
+}
+
+/// A scene as it is, and under every noise and seed.
+fn frames(name: &str) -> Result<(Frame, Vec<Noisy>), String> {
+    let exact = scene(name).ok_or(format!("unknown scene: {name}"))?.render(&Camera::default());
+    let mut frames = Vec::new();
+    for (noise, seeds) in NOISES {
+        let model = Noise::by_name(noise).ok_or(format!("unknown noise: {noise}"))?;
+        for seed in seeds {
+            let frame = model.apply(&exact, &mut Random::new(*seed));
+            frames.push(Noisy { noise, file: format!("{name}-{noise}-{seed}"), frame });
+        }
+    }
+    Ok((exact, frames))
+}
+
+fn clouds(name: &str, folder: &Path) -> Result<(), String> {
+    for Noisy { file, frame, .. } in frames(name)?.1 {
+        let path = folder.join(file + ".cloud");
+        exchange::write_cloud(&path, &frame).map_err(|e| format!("{}: {e}", path.display()))?;
+    }
+    Ok(())
+}
+
+fn scores(name: &str, folder: &Path) -> Result<(), String> {
+    let (exact, frames) = frames(name)?;
+    let distances = Distances::of(&exact);
+    let mut sums: Vec<(&str, String, [Score; 3])> = Vec::new();
+    for noisy in &frames {
+        for (who, scores) in scores_of(noisy, &distances, folder)? {
+            match sums.iter_mut().find(|(noise, w, _)| *noise == noisy.noise && *w == who) {
+                Some((.., sum)) => sum.iter_mut().zip(&scores).for_each(|(a, b)| a.add(b)),
+                None => sums.push((noisy.noise, who, scores)),
+            }
+        }
+    }
+    for (noise, who, scores) in sums {
+        Row::of(name, noise, &who, scores).iter().for_each(|row| println!("{row}"));
+    }
+    Ok(())
+}
+
+/// The scores of our modes, and of the normals that the peers wrote, on one frame.
+fn scores_of(
+    noisy: &Noisy,
+    distances: &Distances,
+    folder: &Path,
+) -> Result<Vec<(String, [Score; 3])>, String> {
+    let frame = &noisy.frame;
+    let score = |normals: &[[f32; 3]]| by_band(frame, distances, normals, 0..normals.len());
+    let ours = parallel::map(Mode::all(), |mode| {
+        let normals = mode.normals(&frame.points, frame.width()).map_err(|e| e.to_string())?;
+        Ok((format!("{OURS}{}", mode.name), score(&normals)))
+    });
+    let mut found = ours.into_iter().collect::<Result<Vec<_>, String>>()?;
+    for (who, path) in peers_of(folder, &noisy.file)? {
+        let mut normals = exchange::read_normals(&path, frame.points.len())
+            .map_err(|e| format!("{}: {e}", path.display()))?;
+        for (normal, point) in normals.iter_mut().zip(&frame.points) {
+            *normal = towards_camera(*normal, *point);
+        }
+        found.push((who, score(&normals)));
+    }
+    Ok(found)
+}
+
+/// The names of the peers that wrote normals of a cloud, and the files.
+fn peers_of(folder: &Path, cloud: &str) -> Result<Vec<(String, PathBuf)>, String> {
+    let files = std::fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let mut peers: Vec<(String, PathBuf)> = files
+        .filter_map(|file| {
+            let path = file.ok()?.path();
+            let name = path.file_name()?.to_str()?.strip_prefix(cloud)?.strip_prefix('.')?;
+            Some((name.strip_suffix(".normals")?.to_owned(), path.clone()))
+        })
+        .collect();
+    peers.sort();
+    Ok(peers)
+}
