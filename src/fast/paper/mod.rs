@@ -18,19 +18,13 @@ use windows::{Rows, Sweep, reach};
 
 use super::paths::{self, Task};
 use super::sink::Sink;
-use super::{Chunk, Parts, lock, reserve, share_out};
+use super::{Chunk, Parts, TILE_BYTES, TILE_ROWS, lock, reserve, share_out};
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::options::{DistanceMetric, Method, Options};
 use crate::paper::PaperMaps;
 use crate::simd::{GROUP, Simd};
-
-/// Rows of a tile: those around it that its windows reach are read again for the next one.
-const TILE_ROWS: usize = 256;
-
-/// Bytes of a tile's rings, to stay in the second-level cache.
-const TILE_BYTES: usize = 512 << 10;
 
 /// Rows of the whole image: depths, and the radii of windows.
 #[derive(Debug, Default)]
