@@ -242,7 +242,8 @@ pub(crate) fn estimates(
     if let Some(stage) = &one_sided {
         let first = estimates.clone();
         for (at, pixel) in pixels().filter(|(at, _)| !cloud.is_missing(*at)) {
-            if !stage.is_poor(at, windows[at].wanted_side) {
+            let has_none = first[at].normal[0].is_nan();
+            if !has_none && !stage.is_poor(at, windows[at].wanted_side) {
                 continue;
             }
             let tolerance = tolerance(cloud.depths[at], options);
@@ -251,7 +252,7 @@ pub(crate) fn estimates(
             };
             let found = stage
                 .adopted(&cloud, &candidates, &first, pixel, tolerance)
-                .or_else(|| (!first[at].normal[0].is_nan()).then_some(first[at]))
+                .or((!has_none).then_some(first[at]))
                 .or_else(|| one_sided::plane_around(&cloud, pixel, same));
             if let Some(found) = found {
                 estimates[at] = oriented(found, at);
