@@ -110,7 +110,7 @@ pub struct PaperOptions {
     /// finite, above 0, default 0.0028, the paper's for a Kinect. See [`PaperOptions::alpha_of_sensor`].
     pub alpha: f32,
     /// Radius of the window over f_DC: B = beta f_DC(d) (Eq. 5). In pixels/unit of length; finite, above 0,
-    /// default 800: with the default alpha 5 px at 1.5 m, 9 px at 2 m.
+    /// default 1200: with the default alpha 7 px at 1.5 m, 13 px at 2 m.
     pub beta: f32,
     /// Neighbours whose depths differ by gamma f_DC(d) or more are a depth change apart (Eq. 6). Without unit;
     /// finite, above 0, default 5.
@@ -132,7 +132,7 @@ impl Default for PaperOptions {
     fn default() -> Self {
         PaperOptions {
             alpha: 0.0028,
-            beta: 800.0,
+            beta: 1200.0,
             gamma: 5.0,
             smallest_radius: 2,
             least_depth_radius: 5,

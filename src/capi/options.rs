@@ -238,7 +238,7 @@ pub unsafe extern "C" fn iine_estimator_set_paper_alpha(
 }
 
 /// Sets beta: the radius of the window in pixels is beta alpha d^2 (Eq. 5). In pixels/unit of length; finite,
-/// above 0; default 800: with the default alpha 5 px at 1.5 m, 9 px at 2 m.
+/// above 0; default 1200: with the default alpha 7 px at 1.5 m, 13 px at 2 m.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
 ///

@@ -8,7 +8,10 @@
 //! structured light sensor's shadow, as wide as the disparity it hides, is always found so.) Such a change lies at
 //! the end of the gap.
 
+use std::ops::Range;
+
 use super::cloud::Cloud;
+use super::planes::InverseDepths;
 use super::rect::Rect;
 use super::summed_area::SummedArea;
 
@@ -57,6 +60,48 @@ impl DepthChanges {
     /// The paper's C.
     pub fn map(&self) -> Vec<bool> {
         self.right.iter().zip(&self.below).map(|(right, below)| *right || *below).collect()
+    }
+
+    /// Without the changes that the slope of the surface on both sides explains: on a steep surface neighbours are
+    /// as far apart as across an edge.
+    pub fn not_explained(&self, cloud: &Cloud, planes: &InverseDepths) -> DepthChanges {
+        /// How far the surface is looked at along and across a change, in pixels.
+        const ALONG: usize = 5;
+        const ACROSS: usize = 2;
+        /// With the sensor's noise along the rows and columns, neighbours differ by up to this many times the slope.
+        const JITTER: f64 = 4.0;
+        let Self { width, height, .. } = *self;
+        let inverse = |at: usize| 1.0 / f64::from(cloud.depths[at]);
+        // `at` is the last pixel before the change, the `i`-th of its row or column, which is the `j`-th; `step`
+        // leads to the next one. `rect` makes a rectangle of ranges along and across.
+        type MakeRect = fn(Range<usize>, Range<usize>) -> Rect;
+        let is_explained = |axis: usize, at: usize, i: usize, j: usize, rect: MakeRect| {
+            let [step, length, lines] = [[1, width, height], [width, height, width]][axis];
+            let next = at + step;
+            let Some(gap) = (1..=i + 1).find(|gap| !cloud.is_missing(next - gap * step)) else {
+                return false;
+            };
+            let jump = (inverse(next) - inverse(next - gap * step)).abs();
+            let across = j.saturating_sub(ACROSS)..(j + ACROSS + 1).min(lines);
+            let (last, first) = (i + 1 - gap, i + 1);
+            let before = rect((last + 1).saturating_sub(ALONG)..last + 1, across.clone());
+            let after = rect(first..(first + ALONG).min(length), across);
+            let slope = |rect: &Rect| planes.plane(rect).map(|plane| plane.slope[axis].abs());
+            let slopes = [slope(&before), slope(&after)].into_iter().flatten();
+            let slope = slopes.reduce(f64::min).unwrap_or(0.0);
+            jump <= JITTER * slope * gap as f64
+        };
+        let mut left = DepthChanges { width, height, right: vec![], below: vec![] };
+        let at = |at: usize| (at % width, at / width);
+        left.right.extend(self.right.iter().enumerate().map(|(i, change)| {
+            let (x, y) = at(i);
+            *change && !is_explained(0, i, x, y, |along, across| Rect { x: along, y: across })
+        }));
+        left.below.extend(self.below.iter().enumerate().map(|(i, change)| {
+            let (x, y) = at(i);
+            *change && !is_explained(1, i, y, x, |along, across| Rect { x: across, y: along })
+        }));
+        left
     }
 
     /// The same, ready to be asked about rectangles.

@@ -4,12 +4,14 @@
 //! One file per step, in its plain form. What the steps share is that a pixel's window is a rectangle inside the
 //! image, and that a method turns the points in a rectangle into a normal.
 
+mod candidates;
 mod cloud;
 mod creases;
 mod depth_change;
 mod distance;
 mod methods;
 mod one_sided;
+mod planes;
 mod rect;
 pub(crate) mod smoothing_area;
 mod summed_area;
@@ -19,9 +21,12 @@ pub(crate) use methods::estimate as plain_estimate;
 pub(crate) use rect::Rect;
 pub(crate) use smoothing_area::window;
 
+use candidates::Candidates;
 use cloud::Cloud;
+use creases::SummedNormals;
 use depth_change::DepthChanges;
-use summed_area::SummedArea;
+use one_sided::OneSided;
+use planes::InverseDepths;
 
 use crate::cloud::Points;
 use crate::methods::{self as pcl, Estimate};
@@ -164,7 +169,7 @@ pub(crate) fn estimates(
     };
 
     let changes = depth_changes(&cloud, options);
-    let (mut windows, mut estimates): (Vec<Window>, Vec<Estimate>) = match options.semantics {
+    let (windows, mut estimates): (Vec<Window>, Vec<Estimate>) = match options.semantics {
         Semantics::Paper => {
             let maps = PaperMaps::of(&cloud, &changes, options);
             pixels()
@@ -200,56 +205,54 @@ pub(crate) fn estimates(
         return estimates;
     }
 
-    let summed_changes = changes.summed();
-    let finite = SummedArea::new(width, height, |at| [u32::from(!cloud.is_missing(at))]);
-    let side = |rect: &Rect| rect.x.len().max(rect.y.len());
-    if options.one_sided_windows {
-        for (at, pixel) in pixels().filter(|(at, _)| !cloud.is_missing(*at)) {
-            let Window { rect, wanted_side } = &windows[at];
-            if rect.as_ref().is_some_and(|rect| side(rect) >= *wanted_side) {
-                continue;
-            }
-            let found = one_sided::window(&cloud, &summed_changes, &finite, pixel, *wanted_side);
-            if let Some(rect) = found {
-                estimates[at] = of_rect(&rect, at);
-                windows[at].rect = Some(rect);
-            }
+    let planes = InverseDepths::new(&cloud);
+    let candidates = Candidates {
+        planes: &planes,
+        changes: &changes.not_explained(&cloud, &planes).summed(),
+        size: (width, height),
+        alpha: f64::from(options.paper.alpha),
+    };
+    let one_sided = options.one_sided_windows.then(|| OneSided::new(&cloud, &candidates, &windows));
+    if let Some(stage) = &one_sided {
+        for (at, choice) in stage.choices.iter().enumerate().filter(|(at, _)| stage.moved[*at]) {
+            estimates[at] =
+                choice.as_ref().map_or(Estimate::NONE, |choice| of_rect(&choice.rect, at));
         }
     }
     if options.crease_windows {
-        let normals = creases::SummedNormals::new(&estimates, width, height);
+        let normals = SummedNormals::new(&estimates, width, height);
+        let largest = 2 * options.paper.largest_radius as usize + 1;
+        let mut found = Vec::new();
         for (at, pixel) in pixels() {
-            let Some(rect) = &windows[at].rect else { continue };
-            if let Some(rect) = creases::window(
-                &cloud,
-                &normals,
-                &summed_changes,
-                pixel,
-                rect,
-                f64::from(options.paper.alpha),
-            ) {
-                let second = of_rect(&rect, at);
-                if !second.normal[0].is_nan() {
-                    estimates[at] = second;
-                }
+            // Those of the stage before are the best of their sizes already.
+            if one_sided.as_ref().is_some_and(|stage| stage.moved[at]) {
+                continue;
+            }
+            let Window { rect: Some(rect), wanted_side } = &windows[at] else { continue };
+            if !normals.vary_in(rect) {
+                continue;
+            }
+            let choice = creases::window(&candidates, pixel, *wanted_side, largest, &mut found);
+            let second = choice.map_or(Estimate::NONE, |choice| of_rect(&choice.rect, at));
+            if !second.normal[0].is_nan() {
+                estimates[at] = second;
             }
         }
     }
-    if options.one_sided_windows {
-        let good = |at: usize| {
-            let Window { rect, wanted_side } = &windows[at];
-            rect.as_ref().is_some_and(|rect| 2 * side(rect) > *wanted_side)
-        };
+    if let Some(stage) = &one_sided {
         let first = estimates.clone();
-        let usable = |at: usize| good(at) && !first[at].normal[0].is_nan();
-        for (at, pixel) in pixels().filter(|(at, _)| !cloud.is_missing(*at) && !usable(*at)) {
-            let depth = cloud.depths[at];
-            let tolerance = one_sided_tolerance(depth, options);
+        for (at, pixel) in pixels().filter(|(at, _)| !cloud.is_missing(*at)) {
+            let has_none = first[at].normal[0].is_nan();
+            if !has_none && !stage.is_poor(at, windows[at].wanted_side) {
+                continue;
+            }
+            let tolerance = tolerance(cloud.depths[at], options);
             let same = |depth: f32, difference: f32, distance: usize| {
                 !is_depth_change(depth, difference, distance.max(1), options)
             };
-            let found = one_sided::adopted(&cloud, &first, usable, pixel, tolerance)
-                .or_else(|| (!first[at].normal[0].is_nan()).then_some(first[at]))
+            let found = stage
+                .adopted(&cloud, &candidates, &first, pixel, tolerance)
+                .or((!has_none).then_some(first[at]))
                 .or_else(|| one_sided::plane_around(&cloud, pixel, same));
             if let Some(found) = found {
                 estimates[at] = oriented(found, at);
@@ -263,13 +266,13 @@ pub(crate) fn estimates(
     estimates
 }
 
-/// How far from a tangent plane a point at a depth may lie to be on that surface: half a depth change.
-fn one_sided_tolerance(depth: f32, options: &Options) -> f64 {
+/// How far from a plane a point at a depth may lie to be on that surface, in inverse depth: half a depth change.
+fn tolerance(depth: f32, options: &Options) -> f64 {
     let change = match options.semantics {
         Semantics::Paper => {
             options.paper.gamma * smoothing_area::smallest_depth_change(depth, &options.paper)
         }
         Semantics::Pcl => crate::depth_change::threshold(depth, options.max_depth_change_factor),
     };
-    f64::from(change) / 2.0
+    f64::from(change / (depth * depth)) / 2.0
 }

@@ -386,7 +386,7 @@ namespace iine
       }
 
       /** \brief Set beta: the radius of the window is beta alpha d^2 (Eq. 5). Not in PCL's class.
-        * \param[in] beta in pixels/unit of length, finite and above 0, default 800; anything else is refused with a
+        * \param[in] beta in pixels/unit of length, finite and above 0, default 1200; anything else is refused with a
         * printed error
         */
       void
@@ -571,7 +571,7 @@ namespace iine
         unsigned number_of_threads = 1;
         Semantics semantics = SEMANTICS_PCL;
         float paper_alpha = 0.0028f;
-        float paper_beta = 800.0f;
+        float paper_beta = 1200.0f;
         float paper_gamma = 5.0f;
         unsigned smallest_radius = 2;
         unsigned least_depth_radius = 5;

@@ -1,0 +1,177 @@
+//! Near depth edges and creases: errors by band on scenes with known normals, with one-sided and crease windows, and
+//! coverage on real frames where `IINE_TEST_DATA` has them.
+
+use std::path::PathBuf;
+
+use iine::{Depth, Estimator, Method, Normals, Options, Points, Semantics};
+use iine_scenes::{Band, Camera, Distances, Frame, Noise, Pcd, Random, scene};
+
+/// A Kinect's frame, a quarter of it: from this column and row on.
+fn camera(from: [f64; 2]) -> Camera {
+    let kinect = Camera::default();
+    let center = [kinect.center[0] - from[0], kinect.center[1] - from[1]];
+    Camera { width: 320, height: 240, center, ..kinect }
+}
+
+fn options(method: Method, one_sided: bool, creases: bool) -> Options {
+    let mut options = Options::default();
+    options.semantics = Semantics::Paper;
+    options.method = method;
+    options.one_sided_windows = one_sided;
+    options.crease_windows = creases;
+    options
+}
+
+fn normals(points: &[[f32; 3]], width: usize, options: Options) -> Vec<[f32; 3]> {
+    let height = points.len() / width;
+    let mut normals = vec![[f32::NAN; 3]; points.len()];
+    Estimator::new(options)
+        .compute(
+            &Points::interleaved(points.as_flattened(), width, height, 3, 0).expect("points"),
+            &mut Normals::interleaved(normals.as_flattened_mut(), width, height, 3, 0, None)
+                .expect("normals"),
+        )
+        .expect("computed");
+    normals
+}
+
+/// Mean angle to the truth in degrees, and share of the points with a normal.
+struct Score {
+    mean: f64,
+    coverage: f64,
+}
+
+fn score(frame: &Frame, distances: &Distances, normals: &[[f32; 3]], band: Band) -> Score {
+    let (mut sum, mut found, mut points) = (0.0, 0.0, 0.0);
+    for (at, normal) in normals.iter().enumerate() {
+        if frame.points[at][2].is_nan() || distances.band(at) != band {
+            continue;
+        }
+        points += 1.0;
+        if normal[0].is_nan() {
+            continue;
+        }
+        found += 1.0;
+        let truth = frame.normals[at];
+        let cosine: f64 = (0..3).map(|i| f64::from(normal[i]) * f64::from(truth[i])).sum();
+        sum += cosine.clamp(-1.0, 1.0).acos().to_degrees();
+    }
+    assert!(points > 500.0, "a band without pixels");
+    Score { mean: sum / found, coverage: found / points }
+}
+
+/// A scene's frame with a noise, and how far its edges are.
+fn frame(name: &str, from: [f64; 2], noise: Noise) -> (Frame, Distances) {
+    let exact = scene(name).expect("a known scene").render(&camera(from));
+    let distances = Distances::of(&exact);
+    (noise.apply(&exact, &mut Random::new(1)), distances)
+}
+
+#[test]
+fn near_depth_edges_errors_are_at_most_twice_those_elsewhere() {
+    let scenes = [
+        ("steps", 320.0),
+        ("box", 160.0),
+        ("tabletop", 320.0),
+        ("sphere", 320.0),
+        ("cylinder", 320.0),
+    ];
+    for (name, x) in scenes {
+        for noise in [Noise::Nguyen, Noise::Khoshelham] {
+            let (frame, distances) = frame(name, [x, 120.0], noise);
+            let options = options(Method::CovarianceMatrix, true, false);
+            let normals = normals(&frame.points, frame.width(), options);
+            let [edge, elsewhere] = [Band::DepthEdge, Band::Elsewhere]
+                .map(|band| score(&frame, &distances, &normals, band));
+            println!("{name} {noise:?}: {:.2} of {:.2} deg", edge.mean, elsewhere.mean);
+            assert!(edge.coverage >= 0.99, "{name} {noise:?}: {}", edge.coverage);
+            assert!(
+                edge.mean <= 2.0 * elsewhere.mean,
+                "{name} {noise:?}: {} of {}",
+                edge.mean,
+                elsewhere.mean
+            );
+        }
+    }
+}
+
+#[test]
+fn the_second_pass_keeps_creases_sharp() {
+    for name in ["crease-90", "crease-135", "ridge-90"] {
+        for (noise, times) in [(Noise::None, 5.0), (Noise::Nguyen, 2.0), (Noise::Khoshelham, 2.0)] {
+            let (frame, distances) = frame(name, [160.0, 120.0], noise);
+            let [single, second] = [false, true].map(|creases| {
+                let options = options(Method::CovarianceMatrix, false, creases);
+                let normals = normals(&frame.points, frame.width(), options);
+                score(&frame, &distances, &normals, Band::Crease)
+            });
+            println!("{name} {noise:?}: {:.2} of {:.2} deg", second.mean, single.mean);
+            assert!(second.coverage >= single.coverage);
+            assert!(
+                times * second.mean <= single.mean,
+                "{name} {noise:?}: {} of {}",
+                second.mean,
+                single.mean
+            );
+        }
+    }
+}
+
+#[test]
+fn the_second_pass_leaves_smooth_surfaces_as_they_are() {
+    for name in ["plane", "sphere", "cylinder"] {
+        for noise in [Noise::None, Noise::Nguyen] {
+            let (frame, distances) = frame(name, [320.0, 120.0], noise);
+            let [single, second] = [false, true].map(|creases| {
+                let options = options(Method::CovarianceMatrix, true, creases);
+                let normals = normals(&frame.points, frame.width(), options);
+                score(&frame, &distances, &normals, Band::Elsewhere).mean
+            });
+            println!("{name} {noise:?}: {second:.3} of {single:.3} deg");
+            assert!(second <= 1.05 * single, "{name} {noise:?}: {second} of {single}");
+        }
+    }
+}
+
+#[test]
+fn almost_every_point_of_a_real_frame_has_a_normal() {
+    let folder = std::env::var_os("IINE_TEST_DATA").map_or_else(
+        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
+        PathBuf::from,
+    );
+    let frames = [
+        "office1.pcd",
+        "milk_cartoon_all_small_clorox.pcd",
+        "kinect_capture0001.pcd",
+        "table_scene_mug_stereo_textured.pcd",
+        "realsense_d435.pcd",
+        "ouster_os1_128.pcd",
+    ];
+    for name in frames {
+        let path = folder.join(name);
+        if !path.exists() {
+            println!(
+                "skipped: almost_every_point_of_a_real_frame_has_a_normal, {name}: no {}",
+                path.display()
+            );
+            continue;
+        }
+        let cloud = Pcd::read(&path).expect("a PCD file");
+        let mut options = options(Method::AverageDepthChange, true, false);
+        if name.starts_with("ouster") {
+            options.zero_is_missing = true;
+            options.paper.depth = Depth::Range;
+            // A LiDAR tells a centimetre or two at any range.
+            options.paper.alpha = 1e-3;
+        }
+        let zero = options.zero_is_missing;
+        let normals = normals(&cloud.points, cloud.width, options);
+        let finite =
+            |point: &[f32; 3]| point.iter().all(|c| c.is_finite()) && !(zero && *point == [0.0; 3]);
+        let points = cloud.points.iter().filter(|point| finite(point)).count();
+        let found = normals.iter().filter(|normal| !normal[0].is_nan()).count();
+        let coverage = found as f64 / points as f64;
+        println!("{name}: {:.2} %", 100.0 * coverage);
+        assert!(coverage >= 0.99, "{name}: {coverage}");
+    }
+}
