@@ -9,7 +9,7 @@ use crate::isa::Isa;
 use crate::methods::{Estimate, covariance_matrix, estimate, estimate_window};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
-use crate::paper::{self, PaperMaps, with_missing_as_nan};
+use crate::paper::{self, PaperMaps, Rect, with_missing_as_nan};
 use crate::smoothing_area::window_side;
 use crate::window::Image;
 
@@ -98,7 +98,7 @@ impl Estimator {
             return fast::paper::compute(self.isa, points, options, None, normals, scratch);
         }
         if self.options.is_beyond_pcl() {
-            for (at, estimate) in self.estimates(points).into_iter().enumerate() {
+            for (at, estimate) in self.estimates(points)?.into_iter().enumerate() {
                 let (x, y) = (at % points.width(), at / points.width());
                 // SAFETY: the sizes are equal, and no other thread is at work.
                 unsafe { normals.write(x, y, estimate.normal, estimate.curvature) };
@@ -152,7 +152,7 @@ impl Estimator {
             return fast::paper::compute(self.isa, points, options, indices, normals, scratch);
         }
         if self.options.is_beyond_pcl() {
-            let estimates = self.estimates(points);
+            let estimates = self.estimates(points)?;
             for (k, &index) in indices.iter().enumerate() {
                 let Estimate { normal, curvature } = estimates[index as usize];
                 // SAFETY: `normals` has an element for every index, and no other thread is at work.
@@ -291,13 +291,24 @@ impl Estimator {
     }
 
     /// All pixels' estimates where PCL's windows and sums alone are not what is asked for.
-    fn estimates(&self, points: &Points) -> Vec<Estimate> {
-        paper::estimates(points, &self.options, |points| {
-            let plain = Plain::new(points, &self.options);
-            let pixels =
-                (0..points.height()).flat_map(|y| (0..points.width()).map(move |x| (x, y)));
-            pixels.map(|(x, y)| (plain.window_side(x, y) as usize, plain.estimate(x, y))).collect()
-        })
+    fn estimates(&mut self, points: &Points) -> Result<Vec<Estimate>, Error> {
+        let is_plain = self.is_plain(points);
+        let Estimator { options, isa, scratch } = self;
+        // To PCL's windows, a point that misses a coordinate is missing whole.
+        let (width, height) = (points.width(), points.height());
+        let cleaned = match options.semantics {
+            Semantics::Pcl => with_missing_as_nan(points, options),
+            Semantics::Paper => Vec::new(),
+        };
+        let cleaned = match options.semantics {
+            Semantics::Pcl => {
+                Some(Points::interleaved(cleaned.as_flattened(), width, height, 3, 0)?)
+            }
+            Semantics::Paper => None,
+        };
+        let points = cleaned.as_ref().unwrap_or(points);
+        let mut engine = Engine { points, options, isa: *isa, scratch, is_plain };
+        paper::estimates(points, options, &mut engine)
     }
 
     /// How much scratch memory is held, in bytes.
@@ -315,6 +326,93 @@ impl Estimator {
 fn packed(points: &[[f32; 3]], width: usize, height: usize) -> Points<'_> {
     Points::interleaved(points.as_flattened(), width, height, 3, 0)
         .expect("a packed copy of a valid cloud")
+}
+
+/// The windows and estimates that the one-sided and crease windows build on.
+struct Engine<'a> {
+    points: &'a Points<'a>,
+    options: &'a Options,
+    isa: Isa,
+    scratch: &'a mut Scratch,
+    is_plain: bool,
+}
+
+impl Engine<'_> {
+    /// The estimates that `compute` writes.
+    fn written(
+        &mut self,
+        compute: impl FnOnce(Isa, &Points, &Options, &Normals, &mut Scratch) -> Result<(), Error>,
+    ) -> Result<Vec<Estimate>, Error> {
+        let (width, height) = (self.points.width(), self.points.height());
+        let mut found = vec![[f32::NAN; 4]; width * height];
+        let normals = Normals::interleaved(found.as_flattened_mut(), width, height, 4, 0, Some(3))?;
+        compute(self.isa, self.points, self.options, &normals, self.scratch)?;
+        let estimate = |[x, y, z, curvature]: [f32; 4]| Estimate { normal: [x, y, z], curvature };
+        Ok(found.into_iter().map(estimate).collect())
+    }
+
+    /// The plain form's estimates of the pixels that have a window.
+    fn plain(&self, estimate: impl Fn((usize, usize)) -> Option<Estimate>) -> Vec<Estimate> {
+        let (width, height) = (self.points.width(), self.points.height());
+        let turned = |at: usize| {
+            let (x, y) = (at % width, at / width);
+            estimate((x, y)).map_or(Estimate::NONE, |found| {
+                let point = self.points.at(x, y);
+                let normal = turn_to_viewpoint(found.normal, point, self.options.viewpoint);
+                Estimate { normal, ..found }
+            })
+        };
+        (0..width * height).map(turned).collect()
+    }
+}
+
+impl paper::Engine for Engine<'_> {
+    fn windows(&mut self) -> Result<(Vec<u32>, Vec<Estimate>), Error> {
+        let (width, height) = (self.points.width(), self.points.height());
+        if self.options.semantics == Semantics::Pcl {
+            let plain = Plain::new(self.points, self.options);
+            let sides = (0..width * height).map(|at| plain.window_side(at % width, at / width));
+            let sides = sides.collect();
+            let estimates = if self.is_plain {
+                self.plain(|(x, y)| Some(plain.estimate(x, y)))
+            } else {
+                self.written(|isa, points, options, normals, scratch| {
+                    fast::compute(isa, points, options, None, normals, scratch)
+                })?
+            };
+            return Ok((sides, estimates));
+        }
+        if self.is_plain {
+            let maps = PaperMaps::new(self.points, self.options);
+            let radii: Vec<u32> =
+                maps.smoothing_radii.iter().map(|radius| *radius as u32).collect();
+            let estimates = self.plain(|(x, y)| {
+                let radius = radii[y * width + x] as usize;
+                let rect = || paper::window((x, y), radius, width, height);
+                (radius > 0).then(|| paper::of_rect(self.points, self.options, &rect()))
+            });
+            return Ok((radii, estimates));
+        }
+        let mut radii = Vec::new();
+        let estimates = self.written(|isa, points, options, normals, scratch| {
+            radii = fast::paper::compute_with_radii(isa, points, options, normals, scratch)?;
+            Ok(())
+        })?;
+        Ok((radii, estimates))
+    }
+
+    fn of_rects(&mut self, rects: &[Option<Rect>]) -> Result<Vec<Estimate>, Error> {
+        if self.options.semantics == Semantics::Pcl || self.is_plain {
+            let width = self.points.width();
+            return Ok(self.plain(|(x, y)| {
+                let rect = rects[y * width + x].as_ref();
+                rect.map(|rect| paper::of_rect(self.points, self.options, rect))
+            }));
+        }
+        self.written(|isa, points, options, normals, scratch| {
+            fast::paper::compute_rects(isa, points, options, rects, normals, scratch)
+        })
+    }
 }
 
 /// The plain form of the whole method: the specification that every fast path is held to.

@@ -21,13 +21,14 @@ pub(crate) use methods::estimate as plain_estimate;
 pub(crate) use rect::Rect;
 pub(crate) use smoothing_area::window;
 
-use candidates::Candidates;
+use candidates::{Candidates, Choice};
 use cloud::Cloud;
 use creases::SummedNormals;
 use depth_change::DepthChanges;
 use one_sided::OneSided;
 use planes::InverseDepths;
 
+use crate::Error;
 use crate::cloud::Points;
 use crate::methods::{self as pcl, Estimate};
 use crate::options::{BorderPolicy, Method, Options, Semantics};
@@ -138,73 +139,80 @@ fn is_depth_change(depth: f32, difference: f32, gap: usize, options: &Options) -
     }
 }
 
-/// The estimates of all pixels, row by row, turned to the viewpoint; `plain` gives the windows and estimates of the
-/// PCL semantics, on the same points.
+/// How windows and their estimates are computed: by the plain forms, or fast. Estimates are turned to the viewpoint.
+pub(crate) trait Engine {
+    /// Every pixel's window, 0 for none, as a radius, or in PCL's semantics as a side; and its estimate.
+    fn windows(&mut self) -> Result<(Vec<u32>, Vec<Estimate>), Error>;
+
+    /// The estimates of other windows, for the pixels that have one.
+    fn of_rects(&mut self, rects: &[Option<Rect>]) -> Result<Vec<Estimate>, Error>;
+}
+
+/// Every pixel's window around it, and the side it would have far from any depth change.
+fn windows_around(cloud: &Cloud, options: &Options, sizes: &[u32]) -> Vec<Window> {
+    let (width, height) = (cloud.width, cloud.height);
+    let of_pixel = |(at, &size): (usize, &u32)| {
+        let (x, y) = (at % width, at / width);
+        let size = size as usize;
+        match options.semantics {
+            Semantics::Paper => {
+                let wanted = smoothing_area::depth_radius(cloud.depths[at], &options.paper);
+                Window {
+                    rect: (size > 0).then(|| window((x, y), size, width, height)),
+                    wanted_side: if wanted.is_nan() { 0 } else { 2 * wanted as usize + 1 },
+                }
+            }
+            Semantics::Pcl => {
+                let range = |at: usize, limit: usize| {
+                    let start = at.saturating_sub(size / 2);
+                    start..(start + size).min(limit)
+                };
+                let z = cloud.points[at][2];
+                let wanted = crate::smoothing_area::window_side(f32::INFINITY, z, options);
+                Window {
+                    rect: (size > 0).then(|| Rect { x: range(x, width), y: range(y, height) }),
+                    wanted_side: wanted as usize,
+                }
+            }
+        }
+    };
+    sizes.iter().enumerate().map(of_pixel).collect()
+}
+
+/// The plain form's estimate of a pixel from any window.
+pub(crate) fn of_rect(points: &Points, options: &Options, rect: &Rect) -> Estimate {
+    match options.semantics {
+        Semantics::Paper => {
+            let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
+            methods::estimate(options.method, &cleaned, rect)
+        }
+        Semantics::Pcl => {
+            let (width, height) = (points.width(), points.height());
+            let side = rect.side();
+            let center = (rect.x.start + side / 2, rect.y.start + side / 2);
+            let image = Image { width, height, border_policy: BorderPolicy::Ignore };
+            let center = (center.0.min(width - 1), center.1.min(height - 1));
+            pcl::estimate(options.method, points, &image, center, side)
+        }
+    }
+}
+
+/// The estimates of all pixels, row by row, turned to the viewpoint: near depth changes from one-sided windows, near
+/// creases from the windows of a second pass, as the options ask.
 pub(crate) fn estimates(
     points: &Points,
     options: &Options,
-    plain_pcl: impl Fn(&Points) -> Vec<(usize, Estimate)>,
-) -> Vec<Estimate> {
+    engine: &mut impl Engine,
+) -> Result<Vec<Estimate>, Error> {
+    let (sizes, mut estimates) = engine.windows()?;
+    if !(options.one_sided_windows || options.crease_windows) {
+        return Ok(estimates);
+    }
     let cloud = Cloud::new(points, options);
     let (width, height) = (cloud.width, cloud.height);
     let pixels = || (0..width * height).map(|at| (at, (at % width, at / width)));
-    let cleaned = Points::interleaved(cloud.points.as_flattened(), width, height, 3, 0)
-        .expect("a packed copy of a valid cloud");
-    let oriented = |estimate: Estimate, at: usize| {
-        let normal = turn_to_viewpoint(estimate.normal, cloud.points[at], options.viewpoint);
-        Estimate { normal, ..estimate }
-    };
-    let of_rect = |rect: &Rect, at: usize| {
-        let estimate = match options.semantics {
-            Semantics::Paper => methods::estimate(options.method, &cloud, rect),
-            Semantics::Pcl => {
-                let side = rect.x.len().max(rect.y.len());
-                let center = (rect.x.start + side / 2, rect.y.start + side / 2);
-                let image = Image { width, height, border_policy: BorderPolicy::Ignore };
-                let center = (center.0.min(width - 1), center.1.min(height - 1));
-                pcl::estimate(options.method, &cleaned, &image, center, side)
-            }
-        };
-        oriented(estimate, at)
-    };
-
     let changes = depth_changes(&cloud, options);
-    let (windows, mut estimates): (Vec<Window>, Vec<Estimate>) = match options.semantics {
-        Semantics::Paper => {
-            let maps = PaperMaps::of(&cloud, &changes, options);
-            pixels()
-                .map(|(at, pixel)| {
-                    let radius = maps.smoothing_radii[at];
-                    let rect = (radius > 0.0)
-                        .then(|| smoothing_area::window(pixel, radius as usize, width, height));
-                    let wanted_side = match maps.depth_radii[at] {
-                        radius if radius.is_nan() => 0,
-                        radius => 2 * radius as usize + 1,
-                    };
-                    let estimate = rect.as_ref().map_or(Estimate::NONE, |rect| of_rect(rect, at));
-                    (Window { rect, wanted_side }, estimate)
-                })
-                .unzip()
-        }
-        Semantics::Pcl => plain_pcl(&cleaned)
-            .into_iter()
-            .zip(pixels())
-            .map(|((side, estimate), (at, (x, y)))| {
-                let range = |at: usize, size: usize| {
-                    let start = at.saturating_sub(side / 2);
-                    start..(start + side).min(size)
-                };
-                let rect = (side > 0).then(|| Rect { x: range(x, width), y: range(y, height) });
-                let z = cloud.points[at][2];
-                let wanted = crate::smoothing_area::window_side(f32::INFINITY, z, options);
-                (Window { rect, wanted_side: wanted as usize }, estimate)
-            })
-            .unzip(),
-    };
-    if !(options.one_sided_windows || options.crease_windows) {
-        return estimates;
-    }
-
+    let windows = windows_around(&cloud, options, &sizes);
     let planes = InverseDepths::new(&cloud);
     let candidates = Candidates {
         planes: &planes,
@@ -214,28 +222,34 @@ pub(crate) fn estimates(
     };
     let one_sided = options.one_sided_windows.then(|| OneSided::new(&cloud, &candidates, &windows));
     if let Some(stage) = &one_sided {
-        for (at, choice) in stage.choices.iter().enumerate().filter(|(at, _)| stage.moved[*at]) {
-            estimates[at] =
-                choice.as_ref().map_or(Estimate::NONE, |choice| of_rect(&choice.rect, at));
+        let moved = |(choice, moved): (&Option<Choice>, &bool)| {
+            choice.as_ref().filter(|_| *moved).map(|choice| choice.rect.clone())
+        };
+        let rects: Vec<_> = stage.choices.iter().zip(&stage.moved).map(moved).collect();
+        let second = engine.of_rects(&rects)?;
+        for at in (0..rects.len()).filter(|at| stage.moved[*at]) {
+            estimates[at] = second[at];
         }
     }
     if options.crease_windows {
         let normals = SummedNormals::new(&estimates, width, height);
         let largest = 2 * options.paper.largest_radius as usize + 1;
         let mut found = Vec::new();
-        for (at, pixel) in pixels() {
+        let mut crease_window = |(at, pixel): (usize, (usize, usize))| {
+            let Window { rect, wanted_side } = &windows[at];
             // Those of the stage before are the best of their sizes already.
-            if one_sided.as_ref().is_some_and(|stage| stage.moved[at]) {
-                continue;
-            }
-            let Window { rect: Some(rect), wanted_side } = &windows[at] else { continue };
-            if !normals.vary_in(rect) {
-                continue;
+            if one_sided.as_ref().is_some_and(|stage| stage.moved[at])
+                || !normals.vary_in(rect.as_ref()?)
+            {
+                return None;
             }
             let choice = creases::window(&candidates, pixel, *wanted_side, largest, &mut found);
-            let second = choice.map_or(Estimate::NONE, |choice| of_rect(&choice.rect, at));
+            choice.map(|choice| choice.rect)
+        };
+        let rects: Vec<_> = pixels().map(&mut crease_window).collect();
+        for (estimate, second) in estimates.iter_mut().zip(engine.of_rects(&rects)?) {
             if !second.normal[0].is_nan() {
-                estimates[at] = second;
+                *estimate = second;
             }
         }
     }
@@ -255,7 +269,8 @@ pub(crate) fn estimates(
                 .or((!has_none).then_some(first[at]))
                 .or_else(|| one_sided::plane_around(&cloud, pixel, same));
             if let Some(found) = found {
-                estimates[at] = oriented(found, at);
+                let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
+                estimates[at] = Estimate { normal, ..found };
             }
         }
     }
@@ -263,7 +278,7 @@ pub(crate) fn estimates(
     if !curvature {
         estimates.iter_mut().for_each(|estimate| estimate.curvature = f32::NAN);
     }
-    estimates
+    Ok(estimates)
 }
 
 /// How far from a plane a point at a depth may lie to be on that surface, in inverse depth: half a depth change.

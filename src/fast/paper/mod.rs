@@ -8,12 +8,13 @@ mod rects;
 mod tile;
 mod windows;
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use depths::row_length;
 use integrals::{Rings, rows_of_rings};
 use methods::{CovarianceMatrix, Gradients, MOMENTS, SmoothedDepthChanges};
-use tile::Tile;
+use tile::{Tile, Windows};
 use windows::{Rows, Sweep, reach};
 
 use super::paths::{self, Task};
@@ -23,7 +24,7 @@ use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::options::{DistanceMetric, Method, Options};
-use crate::paper::PaperMaps;
+use crate::paper::{PaperMaps, Rect};
 use crate::simd::{GROUP, Simd};
 
 /// Rows of the whole image: depths, and the radii of windows.
@@ -70,93 +71,179 @@ pub(crate) fn compute(
     normals: &Normals,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
-    scratch.workers.prepare(options.threads)?;
-    let (width, height) = (points.width(), points.height());
-    let super::Scratch { workers, each, listed, chunks, paper, .. } = scratch;
-    let count = workers.count();
-    each.resize_with(count.max(each.len()), Default::default);
-    let length = row_length(width);
-    let whole_points = points.has_whole_points(normals);
+    let job = Job::new(isa, points, options, normals);
+    job.depths(scratch)?;
+    let largest = job.radii(scratch)?;
+    job.tiles(scratch, indices, normals, largest, None)
+}
 
-    reserve(&mut paper.depths, length * height, 0.0)?;
-    let depths = &mut paper.depths[..length * height];
-    let parts = Parts(depths.as_mut_ptr());
-    workers.for_each(height, |worker, y| {
-        let scratch = &mut lock(&each[worker]).paper;
-        // SAFETY: rows do not overlap.
-        let depths = unsafe { parts.part(y * length..(y + 1) * length) };
-        let task = DepthsTask { points, options, y, whole_points, scratch, depths };
-        // SAFETY: the processor has the instruction set.
-        unsafe { paths::run(isa, task) };
-    });
+/// The radii of all pixels' windows, row by row, 0 for none, and their normals.
+pub(crate) fn compute_with_radii(
+    isa: Isa,
+    points: &Points,
+    options: &Options,
+    normals: &Normals,
+    scratch: &mut super::Scratch,
+) -> Result<Vec<u32>, Error> {
+    compute(isa, points, options, None, normals, scratch)?;
+    let length = row_length(points.width());
+    let mut radii = Vec::with_capacity(points.width() * points.height());
+    for chunk in &scratch.chunks {
+        let first = chunk.start + chunk.own.start - chunk.swept.start;
+        let rows = scratch.paper.radii[first * length..].chunks(length).take(chunk.own.len());
+        radii
+            .extend(rows.flat_map(|row| row[..points.width()].iter().map(|radius| *radius as u32)));
+    }
+    Ok(radii)
+}
 
-    let reach = if count > 1 { reach(&options.paper) } else { height };
-    share_out(height, count, reach, chunks);
-    let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
-    reserve(&mut paper.radii, swept * length, 0.0)?;
-    let radii = &mut paper.radii[..swept * length];
-    let largest = AtomicU32::new(0);
-    if options.paper.distance_metric == DistanceMetric::Euclidean {
-        let parts = Parts(radii.as_mut_ptr());
-        workers.for_each(chunks.len(), |worker, item| {
-            let Chunk { swept, start, .. } = &chunks[item];
-            // SAFETY: chunks have rows of their own.
-            let map = unsafe { parts.part(start * length..(start + swept.len()) * length) };
-            let rows = Rows { width, first: swept.start, count: swept.len(), depths, map };
-            let sweep = &mut lock(&each[worker]).paper.sweep;
+/// The normals of the pixels that have a window of their own among `rects`, row by row; NaN for the others.
+pub(crate) fn compute_rects(
+    isa: Isa,
+    points: &Points,
+    options: &Options,
+    rects: &[Option<Rect>],
+    normals: &Normals,
+    scratch: &mut super::Scratch,
+) -> Result<(), Error> {
+    let job = Job::new(isa, points, options, normals);
+    job.depths(scratch)?;
+    let width = points.width();
+    let reach = |(at, rect): (usize, &Option<Rect>)| {
+        let (x, y, rect) = (at % width, at / width, rect.as_ref()?);
+        let reach = |at: usize, range: &Range<usize>| (at - range.start).max(range.end - 1 - at);
+        Some(reach(x, &rect.x).max(reach(y, &rect.y)))
+    };
+    let largest = rects.iter().enumerate().filter_map(reach).max().unwrap_or(0);
+    job.tiles(scratch, None, normals, largest, Some(rects))
+}
+
+/// One computation.
+struct Job<'a> {
+    isa: Isa,
+    points: &'a Points<'a>,
+    options: &'a Options,
+    whole_points: bool,
+}
+
+impl<'a> Job<'a> {
+    fn new(isa: Isa, points: &'a Points<'a>, options: &'a Options, normals: &Normals) -> Self {
+        Job { isa, points, options, whole_points: points.has_whole_points(normals) }
+    }
+
+    /// All rows of depths.
+    fn depths(&self, scratch: &mut super::Scratch) -> Result<(), Error> {
+        let &Job { points, options, whole_points, .. } = self;
+        scratch.workers.prepare(options.threads)?;
+        let super::Scratch { workers, each, paper, .. } = scratch;
+        each.resize_with(workers.count().max(each.len()), Default::default);
+        let length = row_length(points.width());
+        reserve(&mut paper.depths, length * points.height(), 0.0)?;
+        let parts = Parts(paper.depths.as_mut_ptr());
+        workers.for_each(points.height(), |worker, y| {
+            let scratch = &mut lock(&each[worker]).paper;
+            // SAFETY: rows do not overlap.
+            let depths = unsafe { parts.part(y * length..(y + 1) * length) };
+            let task = DepthsTask { points, options, y, whole_points, scratch, depths };
             // SAFETY: the processor has the instruction set.
-            let radius = unsafe { paths::run(isa, SweepTask { rows, options, sweep }) };
-            largest.fetch_max(radius as u32, Ordering::Relaxed);
+            unsafe { paths::run(self.isa, task) };
         });
-    } else {
-        let maps = PaperMaps::new(points, options);
-        for Chunk { swept, start, .. } in chunks.iter() {
-            for (y, row) in swept.clone().zip(radii[start * length..].chunks_mut(length)) {
-                for (radius, exact) in
-                    row.iter_mut().zip(&maps.smoothing_radii[y * width..][..width])
-                {
-                    *radius = exact.trunc();
-                    largest.fetch_max(*radius as u32, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// The radii of all windows, in the chunks' rows; gives the largest.
+    fn radii(&self, scratch: &mut super::Scratch) -> Result<usize, Error> {
+        let &Job { points, options, .. } = self;
+        let super::Scratch { workers, each, chunks, paper, .. } = scratch;
+        let (width, height) = (points.width(), points.height());
+        let (count, length) = (workers.count(), row_length(width));
+        let reach = if count > 1 { reach(&options.paper) } else { height };
+        share_out(height, count, reach, chunks);
+        let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
+        reserve(&mut paper.radii, swept * length, 0.0)?;
+        let depths = &paper.depths[..length * height];
+        let radii = &mut paper.radii[..swept * length];
+        let largest = AtomicU32::new(0);
+        if options.paper.distance_metric == DistanceMetric::Euclidean {
+            let parts = Parts(radii.as_mut_ptr());
+            workers.for_each(chunks.len(), |worker, item| {
+                let Chunk { swept, start, .. } = &chunks[item];
+                // SAFETY: chunks have rows of their own.
+                let map = unsafe { parts.part(start * length..(start + swept.len()) * length) };
+                let rows = Rows { width, first: swept.start, count: swept.len(), depths, map };
+                let sweep = &mut lock(&each[worker]).paper.sweep;
+                // SAFETY: the processor has the instruction set.
+                let radius = unsafe { paths::run(self.isa, SweepTask { rows, options, sweep }) };
+                largest.fetch_max(radius as u32, Ordering::Relaxed);
+            });
+        } else {
+            let maps = PaperMaps::new(points, options);
+            for Chunk { swept, start, .. } in chunks.iter() {
+                for (y, row) in swept.clone().zip(radii[start * length..].chunks_mut(length)) {
+                    let exact = &maps.smoothing_radii[y * width..][..width];
+                    for (radius, exact) in row.iter_mut().zip(exact) {
+                        *radius = exact.trunc();
+                        largest.fetch_max(*radius as u32, Ordering::Relaxed);
+                    }
                 }
             }
         }
+        Ok(largest.into_inner() as usize)
     }
 
-    let largest = largest.into_inner() as usize;
-    let sink = Sink::new(normals, indices, width, listed)?;
-    let per_chunk = chunks[0].own.len();
-    let (depths, radii, chunks) = (&*depths, &*radii, &*chunks);
-    let row = move |y: usize| {
-        let chunk = &chunks[y / per_chunk];
-        let at = (chunk.start + y - chunk.swept.start) * length;
-        (&depths[y * length..][..length], &radii[at..at + length])
-    };
-    let columns = TILE_BYTES / (column(options.method) * rows_of_rings(largest));
-    let columns = columns.max(4 * largest).next_multiple_of(GROUP);
-    let across = width.div_ceil(columns);
-    // Tiles of like widths.
-    let columns = width.div_ceil(across).next_multiple_of(GROUP);
-    let down = height.div_ceil(TILE_ROWS);
-    let rows = height.div_ceil(down);
-    workers.for_each(across * down, |worker, item| {
-        let (first, column) = (item / across * rows, item % across * columns);
-        if column >= width {
-            return;
-        }
-        let tile = Tile {
-            points,
-            options,
-            columns: column..(column + columns).min(width),
-            rows: first..(first + rows).min(height),
-            whole_points,
-            largest,
-            row,
+    /// The normals, tile by tile, of windows with radii or of `rects`; none reaches farther than `largest`.
+    fn tiles(
+        &self,
+        scratch: &mut super::Scratch,
+        indices: Option<&[i32]>,
+        normals: &Normals,
+        largest: usize,
+        rects: Option<&[Option<Rect>]>,
+    ) -> Result<(), Error> {
+        let &Job { points, options, whole_points, .. } = self;
+        let super::Scratch { workers, each, listed, chunks, paper, .. } = scratch;
+        let (width, height) = (points.width(), points.height());
+        let length = row_length(width);
+        let sink = Sink::new(normals, indices, width, listed)?;
+        let (depths, radii, chunks) = (&paper.depths, &paper.radii, &*chunks);
+        let row = |y: usize| {
+            let windows = match rects {
+                Some(rects) => Windows::Rects(&rects[y * width..][..width]),
+                None => {
+                    let chunk = &chunks[y / chunks[0].own.len()];
+                    let at = (chunk.start + y - chunk.swept.start) * length;
+                    Windows::Radii(&radii[at..at + length])
+                }
+            };
+            (&depths[y * length..][..length], windows)
         };
-        let scratch = &mut lock(&each[worker]).paper;
-        // SAFETY: the processor has the instruction set, and tiles do not share pixels.
-        unsafe { paths::run(isa, TileTask { tile: &tile, scratch, sink: &sink }) };
-    });
-    Ok(())
+        let columns = TILE_BYTES / (column(options.method) * rows_of_rings(largest));
+        let columns = columns.max(4 * largest).next_multiple_of(GROUP);
+        let across = width.div_ceil(columns);
+        // Tiles of like widths.
+        let columns = width.div_ceil(across).next_multiple_of(GROUP);
+        let down = height.div_ceil(TILE_ROWS);
+        let rows = height.div_ceil(down);
+        workers.for_each(across * down, |worker, item| {
+            let (first, column) = (item / across * rows, item % across * columns);
+            if column >= width {
+                return;
+            }
+            let tile = Tile {
+                points,
+                options,
+                columns: column..(column + columns).min(width),
+                rows: first..(first + rows).min(height),
+                whole_points,
+                largest,
+                row,
+            };
+            let scratch = &mut lock(&each[worker]).paper;
+            // SAFETY: the processor has the instruction set, and tiles do not share pixels.
+            unsafe { paths::run(self.isa, TileTask { tile: &tile, scratch, sink: &sink }) };
+        });
+        Ok(())
+    }
 }
 
 /// Bytes that a column takes in a row of a method's rings.
@@ -213,7 +300,7 @@ struct TileTask<'a, 't, F> {
     sink: &'t Sink<'t>,
 }
 
-impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Task for TileTask<'a, '_, F> {
+impl<'a, F: Fn(usize) -> (&'a [f32], Windows<'a>)> Task for TileTask<'a, '_, F> {
     type Output = ();
 
     #[inline(always)]
