@@ -68,18 +68,21 @@ impl Candidates<'_> {
     pub fn best(
         &self,
         pixel: (usize, usize),
-        sides: impl Iterator<Item = usize>,
+        sides: impl Iterator<Item = usize> + Clone,
         found: &mut Vec<(Rect, Plane)>,
     ) -> Option<Choice> {
         let near = Rect::around(pixel, 1, self.size);
         let near =
             if self.changes.none_in(&near) { near } else { Rect::around(pixel, 0, self.size) };
         let near = self.planes.mean(&near)?;
+        // Where there is no depth change as far as any window reaches, none need be asked.
+        let reach = sides.clone().max().unwrap_or(0);
+        let all_smooth = self.changes.none_in(&Rect::around(pixel, reach, self.size));
 
         found.clear();
         for side in sides {
             for rect in windows(pixel, side, self.size) {
-                let smooth = self.changes.none_in(&rect);
+                let smooth = all_smooth || self.changes.none_in(&rect);
                 if !smooth && side < JAGGED_SIDE {
                     continue;
                 }

@@ -15,7 +15,7 @@ use crate::methods::Estimate;
 const SMALLEST_SIDE: usize = 3;
 
 /// The sides to try, from the one that the pixel would have far from any depth change.
-fn sides(wanted: usize) -> impl Iterator<Item = usize> {
+fn sides(wanted: usize) -> impl Iterator<Item = usize> + Clone {
     let smaller = |side: &usize| {
         let next = (side * 7 / 10) | 1;
         (*side > SMALLEST_SIDE).then(|| next.min(side - 2).max(SMALLEST_SIDE))

@@ -120,6 +120,7 @@ impl Plane {
 
     /// How much the inverse depth changes from pixel to pixel along the steepest direction.
     pub fn steepness(&self) -> f64 {
-        self.slope[0].hypot(self.slope[1])
+        let [x, y] = self.slope;
+        (x * x + y * y).sqrt()
     }
 }
