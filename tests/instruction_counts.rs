@@ -6,7 +6,7 @@
 //! the bounds to the counts and 15 %: `... -- print` ends with the table as it should then be. With `IINE_ISA=sse2`
 //! it does so for the other column.
 //!
-//! The program runs itself under valgrind: `frames N METHOD POLICY` computes N frames. The counts are the difference
+//! The program runs itself under valgrind: `frames N SEMANTICS METHOD POLICY` computes N frames. The counts are the difference
 //! between two frames and one, so neither start nor the first frame's allocations are in them.
 
 #[path = "../benches/common/mod.rs"]
@@ -16,27 +16,35 @@ use std::path::Path;
 use std::process::{Command, ExitCode};
 
 use common::Cloud;
-use iine::{BorderPolicy, Estimator, Isa, Method, Options};
+use iine::{BorderPolicy, Estimator, Isa, Method, Options, Semantics};
 
 const WIDTH: usize = 640;
 const HEIGHT: usize = 480;
 
-/// Instructions a pixel at most: with AVX2, with SSE2.
-const BOUNDS: [(Method, BorderPolicy, u64, u64); 7] = [
-    (Method::CovarianceMatrix, BorderPolicy::Ignore, 229, 483),
-    (Method::CovarianceMatrix, BorderPolicy::Mirror, 372, 570),
-    (Method::Average3DGradient, BorderPolicy::Ignore, 117, 193),
-    (Method::Average3DGradient, BorderPolicy::Mirror, 190, 252),
-    (Method::AverageDepthChange, BorderPolicy::Ignore, 135, 209),
-    (Method::AverageDepthChange, BorderPolicy::Mirror, 289, 343),
-    (Method::Simple3DGradient, BorderPolicy::Ignore, 113, 186),
+use BorderPolicy::{Ignore, Mirror};
+use Method::{Average3DGradient, AverageDepthChange, CovarianceMatrix, Simple3DGradient};
+use Semantics::{Paper, Pcl};
+
+/// Instructions a pixel at most: with AVX2, with SSE2. The paper has no border policies.
+const BOUNDS: [(Semantics, Method, BorderPolicy, u64, u64); 10] = [
+    (Pcl, CovarianceMatrix, Ignore, 229, 483),
+    (Pcl, CovarianceMatrix, Mirror, 372, 570),
+    (Pcl, Average3DGradient, Ignore, 117, 193),
+    (Pcl, Average3DGradient, Mirror, 190, 252),
+    (Pcl, AverageDepthChange, Ignore, 135, 209),
+    (Pcl, AverageDepthChange, Mirror, 289, 343),
+    (Pcl, Simple3DGradient, Ignore, 113, 186),
+    (Paper, CovarianceMatrix, Ignore, 305, 486),
+    (Paper, Average3DGradient, Ignore, 237, 348),
+    (Paper, AverageDepthChange, Ignore, 259, 380),
 ];
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if arguments.first().is_some_and(|word| word == "frames") {
         let number = |k: usize| arguments[k].parse::<usize>().expect("a number");
-        frames(number(1), Method::ALL[number(2)], BorderPolicy::ALL[number(3)]);
+        let (method, policy) = (Method::ALL[number(3)], BorderPolicy::ALL[number(4)]);
+        frames(number(1), Semantics::ALL[number(2)], method, policy);
         return ExitCode::SUCCESS;
     }
     if !cfg!(target_arch = "x86_64") {
@@ -60,10 +68,10 @@ fn main() -> ExitCode {
 
     let mut good = true;
     let mut table = Vec::new();
-    for (method, policy, avx2, sse2) in BOUNDS {
+    for (semantics, method, policy, avx2, sse2) in BOUNDS {
         let bound = if isa == Isa::Avx2 { avx2 } else { sse2 };
-        let (count, stages) = count(method, policy, isa);
-        let name = format!("{method:?} {policy:?} {}", isa.name());
+        let (count, stages) = count(semantics, method, policy, isa);
+        let name = format!("{semantics:?} {method:?} {policy:?} {}", isa.name());
         let verdict = if count <= bound { "ok" } else { "FAILED" };
         println!("{verdict} {name}: {count} instructions a pixel, at most {bound}");
         if printing {
@@ -74,7 +82,7 @@ fn main() -> ExitCode {
         let raised = count + (count * 15).div_ceil(100);
         let bounds = if isa == Isa::Avx2 { [raised, sse2] } else { [avx2, raised] };
         table.push(format!(
-            "    (Method::{method:?}, BorderPolicy::{policy:?}, {}, {}),",
+            "    ({semantics:?}, {method:?}, {policy:?}, {}, {}),",
             bounds[0], bounds[1]
         ));
         good &= count <= bound;
@@ -86,9 +94,10 @@ fn main() -> ExitCode {
 }
 
 /// What is counted.
-fn frames(number: usize, method: Method, border_policy: BorderPolicy) {
+fn frames(number: usize, semantics: Semantics, method: Method, border_policy: BorderPolicy) {
     let cloud = Cloud::generated(WIDTH, HEIGHT);
     let mut options = Options::default();
+    options.semantics = semantics;
     options.method = method;
     options.border_policy = border_policy;
     options.depth_dependent_smoothing = true;
@@ -102,15 +111,20 @@ fn frames(number: usize, method: Method, border_policy: BorderPolicy) {
 }
 
 /// Instructions a pixel, and by stage.
-fn count(method: Method, policy: BorderPolicy, isa: Isa) -> (u64, Vec<(&'static str, u64)>) {
+fn count(
+    semantics: Semantics,
+    method: Method,
+    policy: BorderPolicy,
+    isa: Isa,
+) -> (u64, Vec<(&'static str, u64)>) {
     let started = [1, 2].map(|number| {
         let output = Path::new(env!("CARGO_TARGET_TMPDIR"))
-            .join(format!("callgrind.{method:?}.{policy:?}.{number}"));
+            .join(format!("callgrind.{semantics:?}.{method:?}.{policy:?}.{number}"));
         let child = Command::new("valgrind")
             .arg("--tool=callgrind")
             .arg(format!("--callgrind-out-file={}", output.display()))
             .arg(std::env::current_exe().expect("this test's path"))
-            .args(["frames", &number.to_string()])
+            .args(["frames", &number.to_string(), &(semantics as i32).to_string()])
             .args([(method as i32).to_string(), (policy as i32).to_string()])
             .env("IINE_ISA", isa.name())
             .stderr(std::process::Stdio::null())
@@ -143,8 +157,8 @@ fn inclusive(file: &Path) -> [u64; 3] {
     };
     let total = sum(&|line| line.contains("PROGRAM TOTALS"));
     assert!(total > 0, "callgrind_annotate: {text}");
-    let stage = |name: &str| {
-        sum(&|line| line.contains("iine::fast::paths::") && line.contains(&format!("::{name}")))
+    let stage = |names: &[&str]| {
+        sum(&|line| names.iter().any(|name| line.contains(&format!("Job::{name} ["))))
     };
-    [total, stage("sweep"), stage("tile")]
+    [total, stage(&["sweep", "depths", "radii"]), stage(&["tiles"])]
 }

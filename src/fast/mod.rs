@@ -222,7 +222,9 @@ impl Job<'_> {
         f32::from_bits(deepest.into_inner())
     }
 
+    // Not inlined, as the next one: profiles and the test of instruction counts tell the two by name.
     /// Steps 1 to 3: fills the rows with sides of windows. Returns the largest magnitude of a finite depth.
+    #[inline(never)]
     fn sweep(
         &self,
         workers: &Workers,
@@ -249,6 +251,7 @@ impl Job<'_> {
     }
 
     /// Steps 4 and 5, all tiles.
+    #[inline(never)]
     fn tiles<'r>(
         &self,
         workers: &Workers,

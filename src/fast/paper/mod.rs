@@ -126,12 +126,14 @@ struct Job<'a> {
     whole_points: bool,
 }
 
+// The stages are not inlined: profiles and the test of instruction counts tell them by name.
 impl<'a> Job<'a> {
     fn new(isa: Isa, points: &'a Points<'a>, options: &'a Options, normals: &Normals) -> Self {
         Job { isa, points, options, whole_points: points.has_whole_points(normals) }
     }
 
     /// All rows of depths.
+    #[inline(never)]
     fn depths(&self, scratch: &mut super::Scratch) -> Result<(), Error> {
         let &Job { points, options, whole_points, .. } = self;
         scratch.workers.prepare(options.threads)?;
@@ -152,6 +154,7 @@ impl<'a> Job<'a> {
     }
 
     /// The radii of all windows, in the chunks' rows; gives the largest.
+    #[inline(never)]
     fn radii(&self, scratch: &mut super::Scratch) -> Result<usize, Error> {
         let &Job { points, options, .. } = self;
         let super::Scratch { workers, each, chunks, paper, .. } = scratch;
@@ -192,6 +195,7 @@ impl<'a> Job<'a> {
     }
 
     /// The normals, tile by tile, of windows with radii or of `rects`; none reaches farther than `largest`.
+    #[inline(never)]
     fn tiles(
         &self,
         scratch: &mut super::Scratch,
