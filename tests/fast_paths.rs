@@ -151,6 +151,24 @@ fn the_papers_windows_equal_the_plain_form() {
     println!("{worst:?}");
 }
 
+/// Radii beyond the image.
+#[test]
+fn the_papers_largest_windows_equal_the_plain_form() {
+    let mut worst = Worst::default();
+    for (seed, kind) in (0..).zip([Kind::Wavy, Kind::NanPixels, Kind::Shifted]) {
+        let cloud = Cloud::new(kind, 61, 37, seed);
+        for mut options in paper_options().into_iter().step_by(5) {
+            options.paper.gamma = 1e4;
+            (options.paper.least_depth_radius, options.paper.largest_radius) = (1000, 1000);
+            worst.check(&cloud, &format!("{kind:?}"), &options);
+            options.crease_windows = true;
+            options.one_sided_windows = true;
+            worst.check(&cloud, &format!("{kind:?}"), &options);
+        }
+    }
+    println!("{worst:?}");
+}
+
 /// Several tiles and many groups a row.
 #[test]
 fn wide_clouds_equal_the_plain_form() {

@@ -39,9 +39,10 @@ impl<const N: usize> Default for Rings<N> {
     }
 }
 
-/// Rows of the rings for windows of a radius: theirs, and those above and below.
-pub(crate) fn rows_of_rings(radius: usize) -> usize {
-    2 * radius + 3
+/// Rows of the rings for windows that reach a distance from their pixels, in an image of this height: theirs, and
+/// those above and below.
+pub(crate) fn rows_of_rings(reach: usize, height: usize) -> usize {
+    (2 * reach + 3).min(height + 2)
 }
 
 impl<const N: usize> Rings<N> {
@@ -55,10 +56,9 @@ impl<const N: usize> Rings<N> {
             + self.planes.capacity() * size_of::<f32>()
     }
 
-    /// Starts over at row `top`, with windows of up to `radius`.
-    pub fn start(&mut self, columns: Range<usize>, top: usize, radius: usize) {
-        (self.columns, self.largest) = (columns, 0.0);
-        self.rows = rows_of_rings(radius);
+    /// Starts over at row `top`, with rings of so many rows.
+    pub fn start(&mut self, columns: Range<usize>, top: usize, rows: usize) {
+        (self.columns, self.largest, self.rows) = (columns, 0.0, rows);
         let length = self.rows * self.stride();
         grow(&mut self.points, length + GROUP);
         self.points[..length].fill([0.0; 4]);

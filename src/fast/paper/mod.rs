@@ -27,6 +27,9 @@ use crate::options::{DistanceMetric, Method, Options};
 use crate::paper::{PaperMaps, Rect};
 use crate::simd::{GROUP, Simd};
 
+/// Elements of a tile's rings at most: floats hold their indices. Room for the largest windows there are.
+const MOST_INDICES: usize = 1 << 24;
+
 /// Rows of the whole image: depths, and the radii of windows.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
@@ -221,8 +224,10 @@ impl<'a> Job<'a> {
             };
             (&depths[y * length..][..length], windows)
         };
-        let columns = TILE_BYTES / (column(options.method) * rows_of_rings(largest));
-        let columns = columns.max(4 * largest).next_multiple_of(GROUP);
+        let ring = rows_of_rings(largest, height);
+        let columns = (TILE_BYTES / (column(options.method) * ring)).max(4 * largest);
+        let columns = columns.min(MOST_INDICES / ring - 2 * largest - 4 * GROUP);
+        let columns = columns.next_multiple_of(GROUP);
         let across = width.div_ceil(columns);
         // Tiles of like widths.
         let columns = width.div_ceil(across).next_multiple_of(GROUP);

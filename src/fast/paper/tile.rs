@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::integrals::Rings;
+use super::integrals::{Rings, rows_of_rings};
 use super::methods::{Sums, by_number};
 use super::rects::{Bounds, Place, Rects};
 use crate::cloud::Points;
@@ -62,7 +62,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], Windows<'a>)> Tile<'a, F> {
         let (top, bottom) =
             (self.rows.start.saturating_sub(reach), (self.rows.end + reach).min(height));
         let count = columns.len() * (bottom - top);
-        rings.start(columns, top, reach);
+        rings.start(columns, top, rows_of_rings(reach, height));
         // SAFETY: as the caller's.
         unsafe { rings.read::<S>(self.points, (self.row)(top).0, top, self.whole_points) };
         let mut next = top;
