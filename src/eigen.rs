@@ -22,6 +22,27 @@ impl Symmetric3 {
         self.zz += v[2] * v[2];
     }
 
+    /// The covariance matrix of points times their number, in two passes about their mean; and their number. None
+    /// without points.
+    pub fn scatter<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> Option<(Self, f64)> {
+        let (mut mean, mut count) = ([0.0; 3], 0.0);
+        for point in points() {
+            for i in 0..3 {
+                mean[i] += point[i];
+            }
+            count += 1.0;
+        }
+        if count == 0.0 {
+            return None;
+        }
+        mean = mean.map(|sum| sum / count);
+        let mut scatter = Self::default();
+        for point in points() {
+            scatter.add_outer([point[0] - mean[0], point[1] - mean[1], point[2] - mean[2]]);
+        }
+        Some((scatter, count))
+    }
+
     pub fn trace(&self) -> f64 {
         self.xx + self.yy + self.zz
     }

@@ -66,13 +66,6 @@ impl Estimator {
         self.isa == Isa::Scalar || points.width().min(points.height()) < SMALLEST_IMAGE
     }
 
-    /// Whether the paper's windows alone are asked for, and not their plain form.
-    fn is_fast_paper(&self, points: &Points) -> bool {
-        let Options { semantics, one_sided_windows, crease_windows, .. } = self.options;
-        let alone = !(one_sided_windows || crease_windows);
-        semantics == Semantics::Paper && alone && !self.is_plain(points)
-    }
-
     /// The options.
     pub fn options(&self) -> &Options {
         &self.options
@@ -93,37 +86,7 @@ impl Estimator {
             return Err(Error::Size);
         }
         normals.check_disjoint(points)?;
-        if self.is_fast_paper(points) {
-            let (options, scratch) = (&self.options, &mut self.scratch);
-            return fast::paper::compute(self.isa, points, options, None, normals, scratch);
-        }
-        if self.options.is_beyond_pcl() {
-            for (at, estimate) in self.estimates(points)?.into_iter().enumerate() {
-                let (x, y) = (at % points.width(), at / points.width());
-                // SAFETY: the sizes are equal, and no other thread is at work.
-                unsafe { normals.write(x, y, estimate.normal, estimate.curvature) };
-            }
-            return Ok(());
-        }
-        if !self.is_plain(points) {
-            return fast::compute(
-                self.isa,
-                points,
-                &self.options,
-                None,
-                normals,
-                &mut self.scratch,
-            );
-        }
-        let plain = Plain::new(points, &self.options);
-        for y in 0..points.height() {
-            for x in 0..points.width() {
-                let Estimate { normal, curvature } = plain.estimate(x, y);
-                // SAFETY: the sizes are equal, and no other thread is at work.
-                unsafe { normals.write(x, y, normal, curvature) };
-            }
-        }
-        Ok(())
+        self.compute_pixels(points, None, normals)
     }
 
     /// Computes the normals of the pixels that `indices` lists (row * width + column, any order, repeats
@@ -146,30 +109,49 @@ impl Estimator {
             return Err(Error::Index);
         }
         normals.check_disjoint(points)?;
-        if self.is_fast_paper(points) {
-            let (options, scratch) = (&self.options, &mut self.scratch);
-            let indices = Some(indices);
-            return fast::paper::compute(self.isa, points, options, indices, normals, scratch);
-        }
-        if self.options.is_beyond_pcl() {
-            let estimates = self.estimates(points)?;
-            for (k, &index) in indices.iter().enumerate() {
-                let Estimate { normal, curvature } = estimates[index as usize];
-                // SAFETY: `normals` has an element for every index, and no other thread is at work.
-                unsafe { normals.write(k, 0, normal, curvature) };
-            }
-            return Ok(());
-        }
+        self.compute_pixels(points, Some(indices), normals)
+    }
+
+    /// The normals of the pixels that `indices` list, or of all; everything was checked.
+    fn compute_pixels(
+        &mut self,
+        points: &Points,
+        indices: Option<&[i32]>,
+        normals: &Normals,
+    ) -> Result<(), Error> {
+        let Options { semantics, one_sided_windows, crease_windows, .. } = self.options;
         if !self.is_plain(points) {
             let (options, scratch) = (&self.options, &mut self.scratch);
-            return fast::compute(self.isa, points, options, Some(indices), normals, scratch);
+            if semantics == Semantics::Paper && !(one_sided_windows || crease_windows) {
+                return fast::paper::compute(self.isa, points, options, indices, normals, scratch);
+            }
+            if !options.is_beyond_pcl() {
+                return fast::compute(self.isa, points, options, indices, normals, scratch);
+            }
         }
-        let plain = Plain::new(points, &self.options);
-        for (k, &index) in indices.iter().enumerate() {
-            let (x, y) = (index as usize % points.width(), index as usize / points.width());
-            let Estimate { normal, curvature } = plain.estimate(x, y);
-            // SAFETY: `normals` has an element for every index, and no other thread is at work.
-            unsafe { normals.write(k, 0, normal, curvature) };
+        let width = points.width();
+        let write = |estimate: &dyn Fn(usize) -> Estimate| match indices {
+            None => {
+                for pixel in 0..width * points.height() {
+                    let Estimate { normal, curvature } = estimate(pixel);
+                    // SAFETY: the sizes are equal, and no other thread is at work.
+                    unsafe { normals.write(pixel % width, pixel / width, normal, curvature) };
+                }
+            }
+            Some(indices) => {
+                for (k, &index) in indices.iter().enumerate() {
+                    let Estimate { normal, curvature } = estimate(index as usize);
+                    // SAFETY: `normals` has an element for every index, and no other thread is at work.
+                    unsafe { normals.write(k, 0, normal, curvature) };
+                }
+            }
+        };
+        if self.options.is_beyond_pcl() {
+            let estimates = self.estimates(points)?;
+            write(&|pixel| estimates[pixel]);
+        } else {
+            let plain = Plain::new(points, &self.options);
+            write(&|pixel| plain.estimate(pixel % width, pixel / width));
         }
         Ok(())
     }
@@ -180,7 +162,7 @@ impl Estimator {
     /// The window starts at `(x - width / 2, y - height / 2)`; what lies outside the image is clipped, or folded
     /// back with [`BorderPolicy::Mirror`](crate::BorderPolicy::Mirror), which
     /// [`Semantics::Paper`](crate::Semantics::Paper) does not have. NaN if it gives no normal. Takes time
-    /// proportional to the window, or with that semantics or `zero_is_missing` to the cloud.
+    /// proportional to the window, or with `zero_is_missing` in PCL's semantics to the cloud.
     /// Errors: as [`Estimator::compute`], and [`Error::Index`] if the pixel is outside the cloud.
     pub fn compute_window(
         &mut self,
@@ -295,17 +277,10 @@ impl Estimator {
         let is_plain = self.is_plain(points);
         let Estimator { options, isa, scratch } = self;
         // To PCL's windows, a point that misses a coordinate is missing whole.
+        let is_pcl = options.semantics == Semantics::Pcl;
+        let cleaned = is_pcl.then(|| with_missing_as_nan(points, options));
         let (width, height) = (points.width(), points.height());
-        let cleaned = match options.semantics {
-            Semantics::Pcl => with_missing_as_nan(points, options),
-            Semantics::Paper => Vec::new(),
-        };
-        let cleaned = match options.semantics {
-            Semantics::Pcl => {
-                Some(Points::interleaved(cleaned.as_flattened(), width, height, 3, 0)?)
-            }
-            Semantics::Paper => None,
-        };
+        let cleaned = cleaned.as_ref().map(|cleaned| packed(cleaned, width, height));
         let points = cleaned.as_ref().unwrap_or(points);
         let mut engine = Engine { points, options, isa: *isa, scratch, is_plain };
         paper::estimates(points, options, &mut engine)

@@ -14,8 +14,9 @@ pub(crate) struct Rect {
 }
 
 impl Rect {
-    pub fn pixels(&self) -> impl Iterator<Item = (usize, usize)> + use<'_> {
-        self.y.clone().flat_map(move |y| self.x.clone().map(move |x| (x, y)))
+    pub fn pixels(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let Rect { x: columns, y: rows, .. } = self.clone();
+        rows.flat_map(move |y| columns.clone().map(move |x| (x, y)))
     }
 
     /// The part inside the image without its outermost rows and columns.
@@ -44,7 +45,7 @@ impl Image {
         &self,
         start: (isize, isize),
         size: (usize, usize),
-    ) -> impl Iterator<Item = Rect> + use<> {
+    ) -> impl Iterator<Item = Rect> + Clone + use<> {
         let columns = fold(start.0, size.0, self.width, self.border_policy);
         let rows = fold(start.1, size.1, self.height, self.border_policy);
         rows.into_iter().flat_map(move |y| {

@@ -143,8 +143,8 @@ pub unsafe extern "C" fn iine_estimator_compute_indices(
 ///
 /// The window starts at (x - rect_width / 2, y - rect_height / 2). What lies outside the image is left out with
 /// IINE_BORDER_POLICY_IGNORE and folded back with IINE_BORDER_POLICY_MIRROR. Where the window gives no normal, and
-/// a size of 0 never does, NaN is written. Takes time proportional to the window's area, but with
-/// IINE_SEMANTICS_PAPER (where the border policy has no effect) or missing zeros to the cloud's.
+/// a size of 0 never does, NaN is written. The border policy has no effect with IINE_SEMANTICS_PAPER. Takes time
+/// proportional to the window's area, but to the cloud's with missing zeros in PCL's semantics.
 ///
 /// Errors: as `iine_estimator_compute`, IINE_ERROR_INDEX if the pixel is outside the cloud, and
 /// IINE_ERROR_OPTION_VALUE if a size is negative. Nothing is written then.

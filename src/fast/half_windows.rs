@@ -3,7 +3,6 @@
 use super::arithmetic::{Doubles, Floats, cross, dot};
 use super::planes::{Frame, MARGIN, Planes, grow};
 use super::tile::{Found, Sums};
-use crate::cloud::Points;
 use crate::simd::twice::Twice;
 use crate::simd::{GROUP, Simd};
 use crate::window::Image;
@@ -222,10 +221,6 @@ impl Sums for HalfWindows {
                 tangents[g][c] = Floats(with);
             }
         }
-    }
-
-    fn afresh(_: &Points, _: &Image, _: (usize, usize), _: usize) -> Option<Self::Of1> {
-        None
     }
 
     #[inline(always)]

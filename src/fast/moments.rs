@@ -38,6 +38,24 @@ impl<T: Copy> Clone for WindowMoments<T> {
 }
 impl<T: Copy> Copy for WindowMoments<T> {}
 
+impl WindowMoments<f64> {
+    /// Of points, about the first of them.
+    pub fn of(points: impl Iterator<Item = [f64; 3]>) -> Self {
+        let mut moments = WindowMoments { sums: [0.0; CHANNELS], count: 0.0 };
+        let mut origin = None;
+        for point in points {
+            let origin = origin.get_or_insert(point);
+            let [x, y, z] = [0, 1, 2].map(|c| point[c] - origin[c]);
+            let of_point = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
+            for (sum, value) in moments.sums.iter_mut().zip(of_point) {
+                *sum += value;
+            }
+            moments.count += 1.0;
+        }
+        moments
+    }
+}
+
 /// One unit in the last place of a double, and how many of it the path to a sum may gather.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
@@ -227,21 +245,10 @@ impl Sums for Moments {
         (x, y): (usize, usize),
         side: usize,
     ) -> Option<Self::Of1> {
-        let origin = points.at(x, y).map(f64::from);
         let half = (side / 2) as isize;
-        let mut moments = WindowMoments { sums: [0.0; CHANNELS], count: 0.0 };
-        for rect in image.rects((x as isize - half, y as isize - half), (side, side)) {
-            for (y, x) in rect.y.clone().flat_map(|y| rect.x.clone().map(move |x| (y, x))) {
-                let point = points.at(x, y);
-                let [x, y, z] = [0, 1, 2].map(|c| f64::from(point[c]) - origin[c]);
-                let of_point = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
-                for (sum, value) in moments.sums.iter_mut().zip(of_point) {
-                    *sum += value;
-                }
-                moments.count += 1.0;
-            }
-        }
-        Some(moments)
+        let window = (x as isize - half, y as isize - half);
+        let pixels = image.rects(window, (side, side)).flat_map(|rect| rect.pixels());
+        Some(WindowMoments::of(pixels.map(|(x, y)| points.at(x, y).map(f64::from))))
     }
 
     #[inline(always)]

@@ -8,7 +8,6 @@
 use super::arithmetic::{Floats, cross, dot};
 use super::planes::{Frame, MARGIN, Planes, grow};
 use super::tile::{Found, Sums};
-use crate::cloud::Points;
 use crate::simd::twice::Twice;
 use crate::simd::{GROUP, Simd};
 use crate::window::Image;
@@ -228,10 +227,6 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
                 sums[g][c] = unsafe { S::select_i(1 << lane, S::splat_i(one[g][c]), sums[g][c]) };
             }
         }
-    }
-
-    fn afresh(_: &Points, _: &Image, _: (usize, usize), _: usize) -> Option<Self::Of1> {
-        None
     }
 
     #[inline(always)]

@@ -95,11 +95,13 @@ pub(crate) trait Sums {
 
     /// The sums of one window from its points, without the rings' rounding; none if that is left to the plain form.
     fn afresh(
-        points: &Points,
-        image: &Image,
-        pixel: (usize, usize),
-        side: usize,
-    ) -> Option<Self::Of1>;
+        _points: &Points,
+        _image: &Image,
+        _pixel: (usize, usize),
+        _side: usize,
+    ) -> Option<Self::Of1> {
+        None
+    }
 
     /// The estimates from the sums; `sides` are the sides of the windows. Only these `lanes` have sums: the others
     /// hold anything, and may not have a say in these lanes' estimates. Those of `fresh` lanes are from

@@ -37,32 +37,10 @@ fn scatter(
     (width, height): (usize, usize),
 ) -> Option<(Symmetric3, f64)> {
     let window = (start(x, width), start(y, height));
-    let for_each_finite = |f: &mut dyn FnMut([f64; 3])| {
-        for rect in image.rects(window, (width, height)) {
-            for (x, y) in rect.pixels() {
-                let point = points.at(x, y);
-                if is_finite(point) {
-                    f(point.map(f64::from));
-                }
-            }
-        }
-    };
-    let (mut mean, mut count) = ([0.0; 3], 0.0);
-    for_each_finite(&mut |point| {
-        for i in 0..3 {
-            mean[i] += point[i];
-        }
-        count += 1.0;
-    });
-    if count == 0.0 {
-        return None;
-    }
-    mean = mean.map(|sum| sum / count);
-    let mut scatter = Symmetric3::default();
-    for_each_finite(&mut |point| {
-        scatter.add_outer([point[0] - mean[0], point[1] - mean[1], point[2] - mean[2]]);
-    });
-    Some((scatter, count))
+    let rects = image.rects(window, (width, height));
+    let pixels = || rects.clone().flat_map(|rect| rect.pixels());
+    let finite = |(x, y)| Some(points.at(x, y)).filter(|point| is_finite(*point));
+    Symmetric3::scatter(|| pixels().filter_map(finite).map(|point| point.map(f64::from)))
 }
 
 /// The estimate from a (scaled) covariance matrix.

@@ -11,15 +11,15 @@ pub(crate) fn estimate(method: Method, cloud: &impl CleanPoints, rect: &Rect) ->
     match method {
         Method::AverageDepthChange => smoothed_depth_changes(cloud, rect),
         Method::Average3DGradient => gradients(cloud, rect),
-        Method::CovarianceMatrix => plane_of(cloud.finite(rect)).map_or(Estimate::NONE, |p| p.0),
+        Method::CovarianceMatrix => plane_of(|| cloud.finite(rect)).unwrap_or(Estimate::NONE),
         Method::Simple3DGradient => Estimate::NONE,
     }
 }
 
-/// CM (Eq. 16-25): the eigenvector of the smallest eigenvalue of the points' covariance matrix, that eigenvalue over
-/// the trace as curvature, and the matrix's eigenvalues, ascending. None if the points are on one line.
-pub(crate) fn plane_of(points: impl Iterator<Item = [f64; 3]>) -> Option<(Estimate, [f64; 3])> {
-    let (scatter, count) = scatter(points);
+/// CM (Eq. 16-25): the eigenvector of the smallest eigenvalue of the points' covariance matrix, and that eigenvalue
+/// over the trace as curvature. None if the points are on one line.
+pub(crate) fn plane_of<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> Option<Estimate> {
+    let (scatter, count) = Symmetric3::scatter(points)?;
     let (values, vector) = eigen(&scatter);
     let trace = scatter.trace();
     // Rounding keeps points on a line from a middle eigenvalue of exactly 0.
@@ -27,33 +27,14 @@ pub(crate) fn plane_of(points: impl Iterator<Item = [f64; 3]>) -> Option<(Estima
     if count < 3.0 || values[1] <= LINE * trace {
         return None;
     }
-    let estimate =
-        Estimate { normal: vector.map(|c| c as f32), curvature: (values[0] / trace) as f32 };
-    Some((estimate, values.map(|value| value / count)))
+    Some(Estimate { normal: vector.map(|c| c as f32), curvature: (values[0] / trace) as f32 })
 }
 
 /// The eigenvalues of the covariance matrix (Eq. 16) of the finite points in a rectangle, ascending; none if there
 /// are no points.
 pub(crate) fn eigenvalues(cloud: &impl CleanPoints, rect: &Rect) -> Option<[f64; 3]> {
-    let (scatter, count) = scatter(cloud.finite(rect));
-    (count > 0.0).then(|| eigen(&scatter).0.map(|value| value / count))
-}
-
-/// The points' covariance matrix times their number, and their number.
-fn scatter(points: impl Iterator<Item = [f64; 3]>) -> (Symmetric3, f64) {
-    let points: Vec<[f64; 3]> = points.collect();
-    let count = points.len() as f64;
-    let mut mean = [0.0; 3];
-    for point in &points {
-        for i in 0..3 {
-            mean[i] += point[i] / count;
-        }
-    }
-    let mut scatter = Symmetric3::default();
-    for point in &points {
-        scatter.add_outer([point[0] - mean[0], point[1] - mean[1], point[2] - mean[2]]);
-    }
-    (scatter, count)
+    let (scatter, count) = Symmetric3::scatter(|| cloud.finite(rect))?;
+    Some(eigen(&scatter).0.map(|value| value / count))
 }
 
 /// The 3-D gradient method: the cross product of the mean central differences of the points.

@@ -36,7 +36,6 @@ use crate::orientation::turn_to_viewpoint;
 use crate::window::Image;
 
 /// A pixel's window, and the side it would have far from any depth change.
-#[derive(Clone)]
 struct Window {
     rect: Option<Rect>,
     wanted_side: usize,
@@ -57,13 +56,8 @@ pub(crate) struct PaperMaps {
 impl PaperMaps {
     pub fn new(points: &Points, options: &Options) -> Self {
         let cloud = Cloud::new(points, options);
-        let changes = depth_changes(&cloud, options);
-        Self::of(&cloud, &changes, options)
-    }
-
-    fn of(cloud: &Cloud, changes: &DepthChanges, options: &Options) -> Self {
         let paper = &options.paper;
-        let depth_changes = changes.map();
+        let depth_changes = depth_changes(&cloud, options).map();
         let distances = distance::distance_map(
             &depth_changes,
             cloud.width,
@@ -86,8 +80,8 @@ impl PaperMaps {
 
 /// The covariance matrices' eigenvalues of all pixels with one of these radii; NaN for the others.
 pub(crate) fn eigenvalue_map(points: &Points, options: &Options, radii: &[f32]) -> Vec<[f32; 3]> {
-    let cloud = Cloud::new(points, options);
-    let (width, height) = (cloud.width, cloud.height);
+    let cloud = Cleaned { points, zero_is_missing: options.zero_is_missing };
+    let (width, height) = (points.width(), points.height());
     let of_pixel = |(at, &radius): (usize, &f32)| {
         if radius == 0.0 {
             return [f32::NAN; 3];
@@ -119,7 +113,7 @@ pub(crate) fn estimate_window(
     if rect.x.is_empty() || rect.y.is_empty() {
         return Estimate::NONE;
     }
-    methods::estimate(options.method, &Cloud::new(points, options), &rect)
+    of_rect(points, options, &rect)
 }
 
 fn depth_changes(cloud: &Cloud, options: &Options) -> DepthChanges {

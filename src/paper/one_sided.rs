@@ -111,11 +111,11 @@ pub(crate) fn plane_around(
     let depth = cloud.depths[cloud.index(x, y)];
     (1..=2).find_map(|reach| {
         let points = Rect::around((x, y), reach, (cloud.width, cloud.height));
-        let same = points.pixels().filter(|&(nx, ny)| {
+        let is_same = |&(nx, ny): &(usize, usize)| {
             let other = cloud.depths[cloud.index(nx, ny)];
             let distance = x.abs_diff(nx).max(y.abs_diff(ny));
             !other.is_nan() && is_same_surface(depth, other - depth, distance)
-        });
-        plane_of(same.map(|(nx, ny)| cloud.at(nx, ny).map(f64::from))).map(|plane| plane.0)
+        };
+        plane_of(|| points.pixels().filter(is_same).map(|(nx, ny)| cloud.at(nx, ny).map(f64::from)))
     })
 }

@@ -36,7 +36,6 @@ pub(crate) fn smoothing_radius(depth_radius: f32, distance: f32, options: &Paper
 /// The window of a radius: the pixels at most that far from its centre in either direction, inside the image.
 ///
 /// Eq. 3 as printed leaves out the first row and column of them, and is off the centre that its text names.
-pub(crate) fn window((x, y): (usize, usize), radius: usize, width: usize, height: usize) -> Rect {
-    let clip = |at: usize, size: usize| at.saturating_sub(radius)..(at + radius + 1).min(size);
-    Rect { x: clip(x, width), y: clip(y, height) }
+pub(crate) fn window(pixel: (usize, usize), radius: usize, width: usize, height: usize) -> Rect {
+    Rect::around(pixel, radius, (width, height))
 }

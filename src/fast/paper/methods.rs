@@ -51,11 +51,13 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
 
     /// Takes one window's sums from its points, without the rings' rounding; false if that is left to the plain form.
     fn afresh(
-        numbers: &mut Self::Numbers,
-        lane: usize,
-        points: &impl CleanPoints,
-        rect: &Rect,
-    ) -> bool;
+        _numbers: &mut Self::Numbers,
+        _lane: usize,
+        _points: &impl CleanPoints,
+        _rect: &Rect,
+    ) -> bool {
+        false
+    }
 }
 
 /// A few units in the last place of a double.
@@ -131,15 +133,9 @@ impl Sums<MOMENTS> for CovarianceMatrix {
         points: &impl CleanPoints,
         rect: &Rect,
     ) -> bool {
-        let Some(origin) = points.finite(rect).next() else { return false };
-        let mut moments = [0.0; MOMENTS];
-        for point in points.finite(rect) {
-            let [x, y, z] = [0, 1, 2].map(|c| point[c] - origin[c]);
-            let of_point = [x, y, z, 1.0, x * x, x * y, x * z, y * y, y * z, z * z];
-            for (sum, value) in moments.iter_mut().zip(of_point) {
-                *sum += value;
-            }
-        }
+        let WindowMoments { sums, count } = WindowMoments::of(points.finite(rect));
+        let [x, y, z, xx, xy, xz, yy, yz, zz] = sums;
+        let moments = [x, y, z, count, xx, xy, xz, yy, yz, zz];
         Self::take(numbers, lane, moments, &Rects::default(), &[]);
         true
     }
@@ -208,10 +204,6 @@ impl Sums<8> for Gradients {
         }
     }
 
-    fn afresh(_: &mut Self::Numbers, _: usize, _: &impl CleanPoints, _: &Rect) -> bool {
-        false
-    }
-
     fn error(_: [f64; 8], count: usize, largest: f32) -> f64 {
         error_of_differences(count, largest)
     }
@@ -274,10 +266,6 @@ impl Sums<4> for SmoothedDepthChanges {
                 to[lane] = rects.outermost(line, lane, points);
             }
         }
-    }
-
-    fn afresh(_: &mut Self::Numbers, _: usize, _: &impl CleanPoints, _: &Rect) -> bool {
-        false
     }
 
     fn error(_: [f64; 4], count: usize, largest: f32) -> f64 {
