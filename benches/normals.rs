@@ -6,13 +6,12 @@
 
 mod common;
 
-use std::path::PathBuf;
 use std::time::Duration;
 
 use common::{Cloud, POINT};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use iine::{BorderPolicy, Estimator, Isa, Method, Options};
-use iine_scenes::Pcd;
+use iine_scenes::real_frame;
 
 const FRAMES: [&str; 5] = [
     "table_scene_mug_stereo_textured",
@@ -30,16 +29,7 @@ fn options(method: Method) -> Options {
 }
 
 fn frame(name: &str) -> Option<Cloud> {
-    let directory = std::env::var_os("IINE_TEST_DATA").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
-        PathBuf::from,
-    );
-    let path = directory.join(name).with_extension("pcd");
-    if !path.exists() {
-        println!("skipped: {name}: no {}", path.display());
-        return None;
-    }
-    let pcd = Pcd::read(path).expect("a PCD file");
+    let pcd = real_frame("normals", name)?;
     let mut data = Vec::with_capacity(POINT * pcd.points.len());
     for [x, y, z] in pcd.points {
         data.extend([x, y, z, 1.0]);

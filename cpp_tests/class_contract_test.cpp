@@ -11,17 +11,10 @@
 
 #include <gtest/gtest.h>
 
-#include <pcl/point_types.h>
-
-#include <iine/pcl/integral_image_normal.h>
+#include "point_xyz.h"
 
 namespace
 {
-  using Cloud = pcl::PointCloud<pcl::PointXYZ>;
-  using Normals = pcl::PointCloud<pcl::Normal>;
-  using Estimator = iine::IntegralImageNormalEstimation<pcl::PointXYZ, pcl::Normal>;
-  constexpr float NaN = std::numeric_limits<float>::quiet_NaN ();
-
   /** \brief A tilted, slightly uneven surface with a missing block. */
   template <typename PointT = pcl::PointXYZ> typename pcl::PointCloud<PointT>::Ptr
   scene (int width = 60, int height = 44, float tilt = 0.3f)
@@ -57,23 +50,6 @@ namespace
       if (!areSame (a[i], b[i]))
         return ::testing::AssertionFailure () << "normals differ at " << i;
     return ::testing::AssertionSuccess ();
-  }
-
-  std::size_t
-  countNormals (const Normals &normals)
-  {
-    std::size_t count = 0;
-    for (const auto &normal : normals)
-      count += std::isfinite (normal.normal_x);
-    return count;
-  }
-
-  Normals
-  compute (Estimator &estimator)
-  {
-    Normals normals;
-    estimator.compute (normals);
-    return normals;
   }
 
   Normals

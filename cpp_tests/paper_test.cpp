@@ -11,17 +11,10 @@
 
 #include <gtest/gtest.h>
 
-#include <pcl/point_types.h>
-
-#include <iine/pcl/integral_image_normal.h>
+#include "point_xyz.h"
 
 namespace
 {
-  using Cloud = pcl::PointCloud<pcl::PointXYZ>;
-  using Normals = pcl::PointCloud<pcl::Normal>;
-  using Estimator = iine::IntegralImageNormalEstimation<pcl::PointXYZ, pcl::Normal>;
-  constexpr float NaN = std::numeric_limits<float>::quiet_NaN ();
-
   /** \brief Two walls that meet, a step in depth, a missing block and a block of zeros. */
   Cloud::Ptr
   scene (int width = 60, int height = 44)
@@ -117,23 +110,6 @@ namespace
   haveSameBits (const std::vector<Value> &a, const std::vector<Value> &b)
   {
     return a.size () == b.size () && std::memcmp (a.data (), b.data (), a.size () * sizeof (Value)) == 0;
-  }
-
-  std::size_t
-  countNormals (const Normals &normals)
-  {
-    std::size_t count = 0;
-    for (const auto &normal : normals)
-      count += std::isfinite (normal.normal_x);
-    return count;
-  }
-
-  Normals
-  compute (Estimator &estimator)
-  {
-    Normals normals;
-    estimator.compute (normals);
-    return normals;
   }
 
   /** \brief A setting by the class and by the C API. */

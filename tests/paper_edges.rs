@@ -1,10 +1,8 @@
 //! Near depth edges and creases: errors by band on scenes with known normals, with one-sided and crease windows, and
 //! coverage on real frames where `IINE_TEST_DATA` has them.
 
-use std::path::PathBuf;
-
 use iine::{Depth, Estimator, Method, Normals, Options, Points, Semantics};
-use iine_scenes::{Band, Camera, Distances, Frame, Noise, Pcd, Random, scene};
+use iine_scenes::{Band, Camera, Distances, Frame, Noise, REAL_FRAMES, Random, real_frame, scene};
 
 /// A Kinect's frame, a quarter of it: from this column and row on.
 fn camera(from: [f64; 2]) -> Camera {
@@ -135,28 +133,9 @@ fn the_second_pass_leaves_smooth_surfaces_as_they_are() {
 
 #[test]
 fn almost_every_point_of_a_real_frame_has_a_normal() {
-    let folder = std::env::var_os("IINE_TEST_DATA").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
-        PathBuf::from,
-    );
-    let frames = [
-        "office1.pcd",
-        "milk_cartoon_all_small_clorox.pcd",
-        "kinect_capture0001.pcd",
-        "table_scene_mug_stereo_textured.pcd",
-        "realsense_d435.pcd",
-        "ouster_os1_128.pcd",
-    ];
-    for name in frames {
-        let path = folder.join(name);
-        if !path.exists() {
-            println!(
-                "skipped: almost_every_point_of_a_real_frame_has_a_normal, {name}: no {}",
-                path.display()
-            );
-            continue;
-        }
-        let cloud = Pcd::read(&path).expect("a PCD file");
+    for name in REAL_FRAMES {
+        let test = "almost_every_point_of_a_real_frame_has_a_normal";
+        let Some(cloud) = real_frame(test, name) else { continue };
         let mut options = options(Method::AverageDepthChange, true, false);
         if name.starts_with("ouster") {
             options.zero_is_missing = true;

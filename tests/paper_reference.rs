@@ -6,11 +6,9 @@
 
 mod clouds;
 
-use std::path::PathBuf;
-
 use clouds::{Cloud, Kind, Random, angle, compute, normal};
 use iine::{Depth, DistanceMetric, Estimator, Maps, Method, Options, Semantics};
-use iine_scenes::{Camera, Noise, Pcd, drop_out, scene};
+use iine_scenes::{Camera, Noise, REAL_FRAMES, drop_out, real_frame, scene};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 const METHODS: [Method; 3] =
@@ -520,28 +518,10 @@ fn rendered_scenes_match_the_equations() {
     }
 }
 
-const FRAMES: [&str; 6] = [
-    "kinect_capture0001",
-    "milk_cartoon_all_small_clorox",
-    "office1",
-    "ouster_os1_128",
-    "realsense_d435",
-    "table_scene_mug_stereo_textured",
-];
-
 #[test]
 fn real_frames_match_the_equations() {
-    let folder = std::env::var_os("IINE_TEST_DATA").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
-        PathBuf::from,
-    );
-    for (i, name) in FRAMES.into_iter().enumerate() {
-        let path = folder.join(name).with_extension("pcd");
-        if !path.exists() {
-            println!("skipped: real_frames_match_the_equations, {name}: no {}", path.display());
-            continue;
-        }
-        let pcd = Pcd::read(&path).unwrap();
+    for (i, name) in REAL_FRAMES.into_iter().enumerate() {
+        let Some(pcd) = real_frame("real_frames_match_the_equations", name) else { continue };
         let cloud = Cloud { width: pcd.width, height: pcd.height, points: pcd.points };
         let sets = option_sets();
         let j = if name == "ouster_os1_128" { 4 } else { 2 * (i % 2) };

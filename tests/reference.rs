@@ -3,11 +3,9 @@
 
 mod clouds;
 
-use std::path::PathBuf;
-
 use clouds::{Cloud, Kind, angle, compute, methods, normal, options};
 use iine::{BorderPolicy, Estimator, Maps, Method, Options};
-use iine_scenes::Pcd;
+use iine_scenes::{REAL_FRAMES, real_frame};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 /// What the reference says of a pixel.
@@ -213,28 +211,10 @@ fn planes_at_all_tilts_match_the_reference() {
     }
 }
 
-const FRAMES: [&str; 6] = [
-    "kinect_capture0001",
-    "milk_cartoon_all_small_clorox",
-    "office1",
-    "ouster_os1_128",
-    "realsense_d435",
-    "table_scene_mug_stereo_textured",
-];
-
 #[test]
 fn real_frames_match_the_reference() {
-    let folder = std::env::var_os("IINE_TEST_DATA").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"),
-        PathBuf::from,
-    );
-    for name in FRAMES {
-        let path = folder.join(name).with_extension("pcd");
-        if !path.exists() {
-            println!("skipped: real_frames_match_the_reference, {name}: no {}", path.display());
-            continue;
-        }
-        let pcd = Pcd::read(&path).unwrap();
+    for name in REAL_FRAMES {
+        let Some(pcd) = real_frame("real_frames_match_the_reference", name) else { continue };
         let cloud = Cloud { width: pcd.width, height: pcd.height, points: pcd.points };
         for method in methods() {
             for (smoothing, depth_dependent, step) in

@@ -15,6 +15,7 @@ mod lzf;
 mod noise;
 mod pcd;
 mod random;
+mod real;
 mod render;
 mod shapes;
 mod stage;
@@ -24,6 +25,7 @@ pub use bands::{Band, Distances};
 pub use noise::{Noise, drop_out};
 pub use pcd::{Pcd, PcdError};
 pub use random::Random;
+pub use real::{REAL_FRAMES, real_frame};
 pub use render::{Camera, Frame, NO_SURFACE, Scene};
 pub use shapes::Shape;
 pub use stage::{

@@ -1,8 +1,8 @@
 //! The scenes' truth is true, the noise is as published, and real frames can be read.
 
-use std::path::PathBuf;
-
-use iine_scenes::{Camera, Noise, Pcd, Random, SCENES, drop_out, plane, scene};
+use iine_scenes::{
+    Camera, Noise, Pcd, REAL_FRAMES, Random, SCENES, drop_out, plane, real_frame, scene,
+};
 
 #[test]
 fn every_scene_fills_a_good_part_of_the_image_with_unit_normals_that_face_the_camera() {
@@ -103,23 +103,16 @@ fn ascii_files_are_read() {
 
 #[test]
 fn real_frames_are_read() {
-    let folder = std::env::var_os("IINE_TEST_DATA")
-        .map_or_else(|| PathBuf::from("../../shared/data"), PathBuf::from);
     let frames = [
-        ("kinect_capture0001.pcd", 640, 480, 0.81),
-        ("milk_cartoon_all_small_clorox.pcd", 640, 480, 0.786),
-        ("office1.pcd", 640, 480, 0.828),
-        ("ouster_os1_128.pcd", 1024, 128, 1.0),
-        ("realsense_d435.pcd", 640, 480, 0.933),
-        ("table_scene_mug_stereo_textured.pcd", 640, 480, 0.681),
+        (640, 480, 0.81),
+        (640, 480, 0.786),
+        (640, 480, 0.828),
+        (1024, 128, 1.0),
+        (640, 480, 0.933),
+        (640, 480, 0.681),
     ];
-    for (name, width, height, valid) in frames {
-        let path = folder.join(name);
-        if !path.exists() {
-            println!("skipped: {}", path.display());
-            continue;
-        }
-        let pcd = Pcd::read(&path).expect("readable");
+    for (name, (width, height, valid)) in REAL_FRAMES.into_iter().zip(frames) {
+        let Some(pcd) = real_frame("real_frames_are_read", name) else { continue };
         assert_eq!((pcd.width, pcd.height), (width, height), "{name}");
         let finite = pcd.points.iter().filter(|point| point.iter().all(|c| c.is_finite())).count();
         let share = finite as f64 / pcd.points.len() as f64;
