@@ -9,7 +9,7 @@ use crate::isa::Isa;
 use crate::methods::{Estimate, covariance_matrix, estimate, estimate_window};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
-use crate::paper::{self, PaperMaps, Rect, with_missing_as_nan};
+use crate::paper::{self, PaperMaps, with_missing_as_nan};
 use crate::smoothing_area::window_side;
 use crate::window::Image;
 
@@ -363,8 +363,7 @@ impl paper::Engine for Engine<'_> {
                 maps.smoothing_radii.iter().map(|radius| *radius as u32).collect();
             let estimates = self.plain(|(x, y)| {
                 let radius = radii[y * width + x] as usize;
-                let rect = || paper::window((x, y), radius, width, height);
-                (radius > 0).then(|| paper::of_rect(self.points, self.options, &rect()))
+                (radius > 0).then(|| paper::of_radius(self.points, self.options, (x, y), radius))
             });
             return Ok((radii, estimates));
         }
@@ -376,16 +375,16 @@ impl paper::Engine for Engine<'_> {
         Ok((radii, estimates))
     }
 
-    fn of_rects(&mut self, rects: &[Option<Rect>]) -> Result<Vec<Estimate>, Error> {
+    fn of_radii(&mut self, radii: &[u32]) -> Result<Vec<Estimate>, Error> {
         if self.options.semantics == Semantics::Pcl || self.is_plain {
             let width = self.points.width();
             return Ok(self.plain(|(x, y)| {
-                let rect = rects[y * width + x].as_ref();
-                rect.map(|rect| paper::of_rect(self.points, self.options, rect))
+                let radius = radii[y * width + x] as usize;
+                (radius > 0).then(|| paper::of_radius(self.points, self.options, (x, y), radius))
             }));
         }
         self.written(|isa, points, options, normals, scratch| {
-            fast::paper::compute_rects(isa, points, options, rects, normals, scratch)
+            fast::paper::compute_of_radii(isa, points, options, radii, normals, scratch)
         })
     }
 }

@@ -1,7 +1,5 @@
-//! The second pass: windows are moved off the places where the normals of the first pass vary strongly.
+//! Where the first pass' normals vary strongly: near edges without a depth change.
 
-use super::candidates::{Candidates, Choice};
-use super::planes::Plane;
 use super::rect::Rect;
 use super::summed_area::SummedArea;
 use crate::methods::Estimate;
@@ -35,17 +33,3 @@ impl SummedNormals {
 
 /// In square radians: normals about 6 degrees from their mean.
 const STRONG_VARIATION: f64 = 0.01;
-
-/// The best window for a pixel that wants one of a side, near a crease. There are twice as large ones among the
-/// candidates: whether the pixel is on one side of a crease or on the other is told from less noise, and a window
-/// that lies on one plane need not be small.
-pub(crate) fn window(
-    candidates: &Candidates,
-    pixel: (usize, usize),
-    wanted_side: usize,
-    largest_side: usize,
-    found: &mut Vec<(Rect, Plane)>,
-) -> Option<Choice> {
-    let large = (2 * wanted_side + 1).min(largest_side).max(wanted_side);
-    candidates.best(pixel, [large, wanted_side].into_iter(), found)
-}

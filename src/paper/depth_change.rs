@@ -13,7 +13,6 @@ use std::ops::Range;
 use super::cloud::Cloud;
 use super::planes::InverseDepths;
 use super::rect::Rect;
-use super::summed_area::SummedArea;
 
 /// Where there are depth changes, row by row.
 pub(crate) struct DepthChanges {
@@ -104,26 +103,47 @@ impl DepthChanges {
         left
     }
 
-    /// The same, ready to be asked about rectangles.
-    pub fn summed(&self) -> SummedChanges {
-        let sum =
-            |map: &[bool]| SummedArea::new(self.width, self.height, |at| [u32::from(map[at])]);
-        SummedChanges { right: sum(&self.right), below: sum(&self.below) }
-    }
-}
-
-/// Answers in constant time whether there is a depth change inside a rectangle.
-pub(crate) struct SummedChanges {
-    right: SummedArea<u32, 1>,
-    below: SummedArea<u32, 1>,
-}
-
-impl SummedChanges {
-    /// Whether no two neighbours in the rectangle are a depth change apart.
-    pub fn none_in(&self, rect: &Rect) -> bool {
-        let Rect { x, y } = rect.clone();
-        let pairs_right = Rect { x: x.start..x.end.saturating_sub(1).max(x.start), y: y.clone() };
-        let pairs_below = Rect { x, y: y.start..y.end.saturating_sub(1).max(y.start) };
-        self.right.sum(&pairs_right) == [0] && self.below.sum(&pairs_below) == [0]
+    /// The largest radius around every pixel, row by row, of a window in which no two neighbours are a depth change
+    /// apart; `u32::MAX` if there is no change in the image.
+    pub fn clean_radii(&self) -> Vec<u32> {
+        let Self { width, height, .. } = *self;
+        // 0 wherever the pixels around have a change among them, and the chessboard distance from there.
+        let mut radii = vec![u32::MAX; width * height];
+        let mut spoil = |columns: Range<usize>, rows: Range<usize>| {
+            for y in rows {
+                radii[y * width..][columns.clone()].fill(0);
+            }
+        };
+        let around = |at: usize, pixels: usize, size: usize| {
+            at.saturating_sub(1)..(at + pixels + 1).min(size)
+        };
+        for (at, (right, below)) in self.right.iter().zip(&self.below).enumerate() {
+            let (x, y) = (at % width, at / width);
+            if *right {
+                spoil(x..x + 2, around(y, 1, height));
+            }
+            if *below {
+                spoil(around(x, 1, width), y..y + 2);
+            }
+        }
+        let next = |radius: u32| radius.saturating_add(1);
+        for y in 0..height {
+            for x in 0..width {
+                let at = y * width + x;
+                let above = (y > 0).then(|| around(x, 1, width)).into_iter().flatten();
+                let before = above.map(|x| (y - 1) * width + x).chain((x > 0).then(|| at - 1));
+                radii[at] = before.fold(radii[at], |least, other| least.min(next(radii[other])));
+            }
+        }
+        for y in (0..height).rev() {
+            for x in (0..width).rev() {
+                let at = y * width + x;
+                let under = (y + 1 < height).then(|| around(x, 1, width)).into_iter().flatten();
+                let after = under.map(|x| (y + 1) * width + x);
+                let after = after.chain((x + 1 < width).then(|| at + 1));
+                radii[at] = after.fold(radii[at], |least, other| least.min(next(radii[other])));
+            }
+        }
+        radii
     }
 }

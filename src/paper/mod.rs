@@ -1,31 +1,30 @@
-//! The paper's own windows and methods, and what its conclusion leaves open: one-sided windows near depth changes
-//! and a second pass near creases, both also on top of PCL's windows.
+//! The paper's own windows and methods, and what its conclusion leaves open: windows that end at depth changes and
+//! at creases, both also on top of PCL's windows.
 //!
 //! One file per step, in its plain form. What the steps share is that a pixel's window is a rectangle inside the
 //! image, and that a method turns the points in a rectangle into a normal.
 
-mod candidates;
 mod cloud;
 mod creases;
 mod depth_change;
 mod distance;
+mod even_windows;
 mod methods;
-mod one_sided;
 mod planes;
 mod rect;
 pub(crate) mod smoothing_area;
 mod summed_area;
+mod surroundings;
 
 pub(crate) use cloud::{CleanPoints, Cleaned};
 pub(crate) use methods::estimate as plain_estimate;
 pub(crate) use rect::Rect;
 pub(crate) use smoothing_area::window;
 
-use candidates::{Candidates, Choice};
 use cloud::Cloud;
 use creases::SummedNormals;
 use depth_change::DepthChanges;
-use one_sided::OneSided;
+use even_windows::{EvenWindows, largest_radius};
 use planes::InverseDepths;
 
 use crate::Error;
@@ -34,12 +33,6 @@ use crate::methods::{self as pcl, Estimate};
 use crate::options::{BorderPolicy, Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
 use crate::window::Image;
-
-/// A pixel's window, and the side it would have far from any depth change.
-struct Window {
-    rect: Option<Rect>,
-    wanted_side: usize,
-}
 
 /// The maps of [`Semantics::Paper`], row by row.
 pub(crate) struct PaperMaps {
@@ -103,17 +96,15 @@ pub(crate) fn with_missing_as_nan(points: &Points, options: &Options) -> Vec<[f3
 pub(crate) fn estimate_window(
     points: &Points,
     options: &Options,
-    (x, y): (usize, usize),
+    pixel: (usize, usize),
     size: (usize, usize),
 ) -> Estimate {
-    let range = |at: usize, size: usize, limit: usize| {
-        at.saturating_sub(size / 2)..(at + size).saturating_sub(size / 2).min(limit)
-    };
-    let rect = Rect { x: range(x, size.0, points.width()), y: range(y, size.1, points.height()) };
+    let rect = rect_around(pixel, size, (points.width(), points.height()));
     if rect.x.is_empty() || rect.y.is_empty() {
         return Estimate::NONE;
     }
-    of_rect(points, options, &rect)
+    let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
+    methods::estimate(options.method, &cleaned, &rect)
 }
 
 fn depth_changes(cloud: &Cloud, options: &Options) -> DepthChanges {
@@ -138,61 +129,61 @@ pub(crate) trait Engine {
     /// Every pixel's window, 0 for none, as a radius, or in PCL's semantics as a side; and its estimate.
     fn windows(&mut self) -> Result<(Vec<u32>, Vec<Estimate>), Error>;
 
-    /// The estimates of other windows, for the pixels that have one.
-    fn of_rects(&mut self, rects: &[Option<Rect>]) -> Result<Vec<Estimate>, Error>;
+    /// The estimates of other windows, for the pixels that have one, by their radii.
+    fn of_radii(&mut self, radii: &[u32]) -> Result<Vec<Estimate>, Error>;
 }
 
-/// Every pixel's window around it, and the side it would have far from any depth change.
-fn windows_around(cloud: &Cloud, options: &Options, sizes: &[u32]) -> Vec<Window> {
-    let (width, height) = (cloud.width, cloud.height);
-    let of_pixel = |(at, &size): (usize, &u32)| {
-        let (x, y) = (at % width, at / width);
-        let size = size as usize;
-        match options.semantics {
-            Semantics::Paper => {
-                let wanted = smoothing_area::depth_radius(cloud.depths[at], &options.paper);
-                Window {
-                    rect: (size > 0).then(|| window((x, y), size, width, height)),
-                    wanted_side: if wanted.is_nan() { 0 } else { 2 * wanted as usize + 1 },
-                }
-            }
-            Semantics::Pcl => {
-                let range = |at: usize, limit: usize| {
-                    let start = at.saturating_sub(size / 2);
-                    start..(start + size).min(limit)
-                };
-                let z = cloud.points[at][2];
-                let wanted = crate::smoothing_area::window_side(f32::INFINITY, z, options);
-                Window {
-                    rect: (size > 0).then(|| Rect { x: range(x, width), y: range(y, height) }),
-                    wanted_side: wanted as usize,
-                }
-            }
-        }
-    };
-    sizes.iter().enumerate().map(of_pixel).collect()
-}
-
-/// The plain form's estimate of a pixel from any window.
-pub(crate) fn of_rect(points: &Points, options: &Options, rect: &Rect) -> Estimate {
+/// The size that the window of a pixel has far from any depth change, as [`Engine::windows`] gives them; 0 at a
+/// missing point.
+fn wanted_size(cloud: &Cloud, options: &Options, at: usize) -> u32 {
     match options.semantics {
-        Semantics::Paper => {
-            let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
-            methods::estimate(options.method, &cleaned, rect)
-        }
+        Semantics::Paper => smoothing_area::depth_radius(cloud.depths[at], &options.paper) as u32,
         Semantics::Pcl => {
-            let (width, height) = (points.width(), points.height());
-            let side = rect.side();
-            let center = (rect.x.start + side / 2, rect.y.start + side / 2);
-            let image = Image { width, height, border_policy: BorderPolicy::Ignore };
-            let center = (center.0.min(width - 1), center.1.min(height - 1));
-            pcl::estimate(options.method, points, &image, center, side)
+            crate::smoothing_area::window_side(f32::INFINITY, cloud.points[at][2], options)
         }
     }
 }
 
-/// The estimates of all pixels, row by row, turned to the viewpoint: near depth changes from one-sided windows, near
-/// creases from the windows of a second pass, as the options ask.
+/// The window of a size as [`Engine::windows`] gives them, without what lies outside the image.
+fn window_of_size(cloud: &Cloud, options: &Options, at: usize, size: u32) -> Rect {
+    let (width, height) = (cloud.width, cloud.height);
+    let (pixel, size) = ((at % width, at / width), size as usize);
+    match options.semantics {
+        Semantics::Paper => window(pixel, size, width, height),
+        Semantics::Pcl => rect_around(pixel, (size, size), (width, height)),
+    }
+}
+
+/// The part inside the image of a window of any size.
+fn rect_around(pixel: (usize, usize), size: (usize, usize), image: (usize, usize)) -> Rect {
+    let range = |at: usize, size: usize, limit: usize| {
+        at.saturating_sub(size / 2)..(at + size).saturating_sub(size / 2).min(limit)
+    };
+    Rect { x: range(pixel.0, size.0, image.0), y: range(pixel.1, size.1, image.1) }
+}
+
+/// The plain form's estimate of a pixel from the window of a radius.
+pub(crate) fn of_radius(
+    points: &Points,
+    options: &Options,
+    pixel: (usize, usize),
+    radius: usize,
+) -> Estimate {
+    let (width, height) = (points.width(), points.height());
+    match options.semantics {
+        Semantics::Paper => {
+            let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
+            methods::estimate(options.method, &cleaned, &window(pixel, radius, width, height))
+        }
+        Semantics::Pcl => {
+            let image = Image { width, height, border_policy: BorderPolicy::Ignore };
+            pcl::estimate(options.method, points, &image, pixel, 2 * radius + 1)
+        }
+    }
+}
+
+/// The estimates of all pixels, row by row, turned to the viewpoint: near depth changes and near creases from the
+/// even windows of a second pass, as the options ask.
 pub(crate) fn estimates(
     points: &Points,
     options: &Options,
@@ -204,76 +195,70 @@ pub(crate) fn estimates(
     }
     let cloud = Cloud::new(points, options);
     let (width, height) = (cloud.width, cloud.height);
-    let pixels = || (0..width * height).map(|at| (at, (at % width, at / width)));
-    let changes = depth_changes(&cloud, options);
-    let windows = windows_around(&cloud, options, &sizes);
-    let planes = InverseDepths::new(&cloud);
-    let candidates = Candidates {
-        planes: &planes,
-        changes: &changes.not_explained(&cloud, &planes).summed(),
-        size: (width, height),
-        alpha: f64::from(options.paper.alpha),
+    let wanted_radius = |at: usize| match options.semantics {
+        Semantics::Paper => wanted_size(&cloud, options, at) as usize,
+        Semantics::Pcl => wanted_size(&cloud, options, at) as usize / 2,
     };
-    let one_sided = options.one_sided_windows.then(|| OneSided::new(&cloud, &candidates, &windows));
-    if let Some(stage) = &one_sided {
-        let moved = |(choice, moved): (&Option<Choice>, &bool)| {
-            choice.as_ref().filter(|_| *moved).map(|choice| choice.rect.clone())
+    let limit = options.paper.largest_radius as usize;
+    let inverse = InverseDepths::new(&cloud);
+    let changes = depth_changes(&cloud, options).not_explained(&cloud, &inverse);
+    let clean = changes.clean_radii();
+    let alpha = options.paper.alpha;
+    let even = EvenWindows::new(&cloud, &inverse, &clean, wanted_radius, limit, alpha);
+    let normals = options.crease_windows.then(|| SummedNormals::new(&estimates, width, height));
+
+    // The pixels that another pixel's window may serve better, and which one; that, or none.
+    let mut moved: Vec<(usize, Option<usize>)> = Vec::new();
+    let mut found = Vec::new();
+    for at in (0..width * height).filter(|at| !cloud.is_missing(*at)) {
+        let is_cut = options.one_sided_windows && sizes[at] < wanted_size(&cloud, options, at);
+        let is_near_crease = || {
+            sizes[at] > 0
+                && normals.as_ref().is_some_and(|normals| {
+                    normals.vary_in(&window_of_size(&cloud, options, at, sizes[at]))
+                })
         };
-        let rects: Vec<_> = stage.choices.iter().zip(&stage.moved).map(moved).collect();
-        let second = engine.of_rects(&rects)?;
-        for at in (0..rects.len()).filter(|at| stage.moved[*at]) {
-            estimates[at] = second[at];
-        }
-    }
-    if options.crease_windows {
-        let normals = SummedNormals::new(&estimates, width, height);
-        let largest = 2 * options.paper.largest_radius as usize + 1;
-        let mut found = Vec::new();
-        let mut crease_window = |(at, pixel): (usize, (usize, usize))| {
-            let Window { rect, wanted_side } = &windows[at];
-            // Those of the stage before are the best of their sizes already.
-            if one_sided.as_ref().is_some_and(|stage| stage.moved[at])
-                || !normals.vary_in(rect.as_ref()?)
-            {
-                return None;
-            }
-            let choice = creases::window(&candidates, pixel, *wanted_side, largest, &mut found);
-            choice.map(|choice| choice.rect)
-        };
-        let rects: Vec<_> = pixels().map(&mut crease_window).collect();
-        for (estimate, second) in estimates.iter_mut().zip(engine.of_rects(&rects)?) {
-            if !second.normal[0].is_nan() {
-                *estimate = second;
-            }
-        }
-    }
-    if let Some(stage) = &one_sided {
-        let first = estimates.clone();
-        for (at, pixel) in pixels().filter(|(at, _)| !cloud.is_missing(*at)) {
-            let has_none = first[at].normal[0].is_nan();
-            if !has_none && !stage.is_poor(at, windows[at].wanted_side) {
-                continue;
-            }
+        if is_cut || is_near_crease() {
+            let largest = largest_radius(wanted_radius(at), limit);
+            let halves = std::iter::successors(Some(largest), |radius| Some(radius / 2));
+            let radii = halves.take_while(|radius| *radius > 0);
+            let levels = if is_cut { usize::MAX } else { CREASE_LEVELS };
             let tolerance = tolerance(cloud.depths[at], options);
+            let pixel = (at % width, at / width);
+            moved.push((at, even.best(pixel, radii.take(levels), tolerance, &mut found)));
+        }
+    }
+    let mut radii = vec![0; width * height];
+    for &(_, other) in &moved {
+        if let Some(other) = other {
+            radii[other] = even.radius(other);
+        }
+    }
+    let second = engine.of_radii(&radii)?;
+    for (at, other) in moved {
+        let other = other.map_or(Estimate::NONE, |other| second[other]);
+        let found = if !other.normal[0].is_nan() {
+            other
+        } else if options.one_sided_windows && estimates[at].normal[0].is_nan() {
             let same = |depth: f32, difference: f32, distance: usize| {
                 !is_depth_change(depth, difference, distance.max(1), options)
             };
-            let found = stage
-                .adopted(&cloud, &candidates, &first, pixel, tolerance)
-                .or((!has_none).then_some(first[at]))
-                .or_else(|| one_sided::plane_around(&cloud, pixel, same));
-            if let Some(found) = found {
-                let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
-                estimates[at] = Estimate { normal, ..found };
-            }
-        }
+            let pixel = (at % width, at / width);
+            surroundings::plane_around(&cloud, pixel, same).unwrap_or(Estimate::NONE)
+        } else {
+            continue;
+        };
+        let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
+        estimates[at] = Estimate { normal, ..found };
     }
-    let curvature = options.method == Method::CovarianceMatrix;
-    if !curvature {
+    if options.method != Method::CovarianceMatrix {
         estimates.iter_mut().for_each(|estimate| estimate.curvature = f32::NAN);
     }
     Ok(estimates)
 }
+
+/// A crease does not bound the windows next to it as a depth change does: of the sizes that are tried, these many.
+const CREASE_LEVELS: usize = 2;
 
 /// How far from a plane a point at a depth may lie to be on that surface, in inverse depth: half a depth change.
 fn tolerance(depth: f32, options: &Options) -> f64 {

@@ -18,7 +18,7 @@ pub(crate) struct InverseDepths {
 }
 
 /// The linear function of the position that fits the inverse depths in a rectangle best.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(crate) struct Plane {
     center: [f64; 2],
     offset: f64,
@@ -116,6 +116,12 @@ impl Plane {
     /// The inverse depth at a position.
     pub fn at(&self, [x, y]: [f64; 2]) -> f64 {
         self.offset + self.slope[0] * (x - self.center[0]) + self.slope[1] * (y - self.center[1])
+    }
+
+    /// The variance of a noise whose samples of as many points have, `deviations` standard deviations below their
+    /// mean, this plane's.
+    pub fn noise(&self, deviations: f64) -> f64 {
+        self.unevenness * (1.0 + deviations * (2.0 / (self.points - 3.0)).sqrt())
     }
 
     /// How much the inverse depth changes from pixel to pixel along the steepest direction.

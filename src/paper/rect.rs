@@ -32,8 +32,8 @@ impl Rect {
         (middle(&self.x), middle(&self.y))
     }
 
-    /// The longer side.
-    pub fn side(&self) -> usize {
-        self.x.len().max(self.y.len())
+    /// The number of pixels.
+    pub fn area(&self) -> usize {
+        self.x.len() * self.y.len()
     }
 }

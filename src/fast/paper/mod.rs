@@ -8,13 +8,12 @@ mod rects;
 mod tile;
 mod windows;
 
-use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use depths::row_length;
 use integrals::{Rings, rows_of_rings};
 use methods::{CovarianceMatrix, Gradients, MOMENTS, SmoothedDepthChanges};
-use tile::{Tile, Windows};
+use tile::Tile;
 use windows::{Rows, Sweep, reach};
 
 use super::paths::{self, Task};
@@ -24,7 +23,7 @@ use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::options::{DistanceMetric, Method, Options};
-use crate::paper::{PaperMaps, Rect};
+use crate::paper::PaperMaps;
 use crate::simd::{GROUP, Simd};
 
 /// Elements of a tile's rings at most: floats hold their indices. Room for the largest windows there are.
@@ -77,7 +76,7 @@ pub(crate) fn compute(
     let job = Job::new(isa, points, options, normals);
     job.depths(scratch)?;
     let largest = job.radii(scratch)?;
-    job.tiles(scratch, indices, normals, largest, None)
+    job.tiles(scratch, indices, normals, largest)
 }
 
 /// The radii of all pixels' windows, row by row, 0 for none, and their normals.
@@ -100,25 +99,19 @@ pub(crate) fn compute_with_radii(
     Ok(radii)
 }
 
-/// The normals of the pixels that have a window of their own among `rects`, row by row; NaN for the others.
-pub(crate) fn compute_rects(
+/// The normals of the pixels that have a window of one of these radii, row by row; NaN for the others.
+pub(crate) fn compute_of_radii(
     isa: Isa,
     points: &Points,
     options: &Options,
-    rects: &[Option<Rect>],
+    radii: &[u32],
     normals: &Normals,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
     let job = Job::new(isa, points, options, normals);
     job.depths(scratch)?;
-    let width = points.width();
-    let reach = |(at, rect): (usize, &Option<Rect>)| {
-        let (x, y, rect) = (at % width, at / width, rect.as_ref()?);
-        let reach = |at: usize, range: &Range<usize>| (at - range.start).max(range.end - 1 - at);
-        Some(reach(x, &rect.x).max(reach(y, &rect.y)))
-    };
-    let largest = rects.iter().enumerate().filter_map(reach).max().unwrap_or(0);
-    job.tiles(scratch, None, normals, largest, Some(rects))
+    let largest = job.given_radii(scratch, radii)?;
+    job.tiles(scratch, None, normals, largest)
 }
 
 /// One computation.
@@ -197,7 +190,22 @@ impl<'a> Job<'a> {
         Ok(largest.into_inner() as usize)
     }
 
-    /// The normals, tile by tile, of windows with radii or of `rects`; none reaches farther than `largest`.
+    /// As [`Job::radii`], of radii that are there.
+    fn given_radii(&self, scratch: &mut super::Scratch, given: &[u32]) -> Result<usize, Error> {
+        let super::Scratch { chunks, paper, .. } = scratch;
+        let (width, height) = (self.points.width(), self.points.height());
+        let length = row_length(width);
+        share_out(height, 1, height, chunks);
+        reserve(&mut paper.radii, height * length, 0.0)?;
+        for (to, from) in paper.radii.chunks_mut(length).zip(given.chunks(width)) {
+            for (to, from) in to.iter_mut().zip(from) {
+                *to = *from as f32;
+            }
+        }
+        Ok(given.iter().max().map_or(0, |largest| *largest as usize))
+    }
+
+    /// The normals, tile by tile; no window's radius is above `largest`.
     #[inline(never)]
     fn tiles(
         &self,
@@ -205,7 +213,6 @@ impl<'a> Job<'a> {
         indices: Option<&[i32]>,
         normals: &Normals,
         largest: usize,
-        rects: Option<&[Option<Rect>]>,
     ) -> Result<(), Error> {
         let &Job { points, options, whole_points, .. } = self;
         let super::Scratch { workers, each, listed, chunks, paper, .. } = scratch;
@@ -214,15 +221,9 @@ impl<'a> Job<'a> {
         let sink = Sink::new(normals, indices, width, listed)?;
         let (depths, radii, chunks) = (&paper.depths, &paper.radii, &*chunks);
         let row = |y: usize| {
-            let windows = match rects {
-                Some(rects) => Windows::Rects(&rects[y * width..][..width]),
-                None => {
-                    let chunk = &chunks[y / chunks[0].own.len()];
-                    let at = (chunk.start + y - chunk.swept.start) * length;
-                    Windows::Radii(&radii[at..at + length])
-                }
-            };
-            (&depths[y * length..][..length], windows)
+            let chunk = &chunks[y / chunks[0].own.len()];
+            let at = (chunk.start + y - chunk.swept.start) * length;
+            (&depths[y * length..][..length], &radii[at..at + length])
         };
         let ring = rows_of_rings(largest, height);
         let columns = (TILE_BYTES / (column(options.method) * ring)).max(4 * largest);
@@ -309,7 +310,7 @@ struct TileTask<'a, 't, F> {
     sink: &'t Sink<'t>,
 }
 
-impl<'a, F: Fn(usize) -> (&'a [f32], Windows<'a>)> Task for TileTask<'a, '_, F> {
+impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Task for TileTask<'a, '_, F> {
     type Output = ();
 
     #[inline(always)]

@@ -1,7 +1,6 @@
 //! Where in a tile's rings eight windows lie (Eq. 3).
 
 use super::integrals::Counted;
-use crate::paper::Rect;
 use crate::simd::{GROUP, Simd};
 
 type Indices = [i32; GROUP];
@@ -18,56 +17,6 @@ pub(crate) struct Place {
     pub left: usize,
     pub stride: usize,
     pub rows: usize,
-}
-
-/// First columns and rows of eight windows, and those behind the last: columns from the rings' first on, rows from the
-/// pixels' own on.
-pub(crate) struct Bounds<S: Simd> {
-    x: [S::F; 2],
-    y: [S::F; 2],
-}
-
-impl<S: Simd> Bounds<S> {
-    /// Of eight radii, as `paper::smoothing_area::window` has them.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    pub unsafe fn of_radii(place: &Place, radii: S::F) -> Self {
-        // SAFETY: as the caller's.
-        unsafe {
-            let x = S::add(S::load(STEPS.as_ptr()), S::splat((place.x - place.left) as f32));
-            Bounds {
-                x: range::<S>(x, radii, -(place.left as f32), place.image[0] as f32),
-                y: range::<S>(S::splat(0.0), radii, -(place.y as f32), place.image[1] as f32),
-            }
-        }
-    }
-
-    /// Of up to eight windows, and which of them there are.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    pub unsafe fn of_rects(place: &Place, rects: &[Option<Rect>]) -> (u32, Self) {
-        let mut ends = [[0.0; GROUP]; 4];
-        let mut windows = 0;
-        for (lane, rect) in rects.iter().enumerate() {
-            let Some(Rect { x, y }) = rect else { continue };
-            windows |= 1 << lane;
-            let x = [x.start, x.end].map(|x| x as f32 - place.left as f32);
-            let y = [y.start, y.end].map(|y| y as f32 - place.y as f32);
-            for (to, end) in ends.iter_mut().zip([x[0], x[1], y[0], y[1]]) {
-                to[lane] = end;
-            }
-        }
-        // SAFETY: as the caller's.
-        unsafe {
-            let [x0, x1, y0, y1] = ends.each_ref().map(|ends| ends.as_ptr());
-            let x = [S::load(x0), S::load(x1)];
-            (windows, Bounds { x, y: [S::load(y0), S::load(y1)] })
-        }
-    }
 }
 
 /// Indices of the elements that eight windows need.
@@ -88,17 +37,19 @@ pub(crate) struct Rects {
 const STEPS: [f32; GROUP] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 impl Rects {
-    /// Where eight windows lie.
+    /// Where eight windows lie, as `paper::smoothing_area::window` has them.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`. Indices are below 2^24.
     #[inline(always)]
-    pub unsafe fn new<S: Simd>(place: &Place, bounds: &Bounds<S>, inner: bool, ends: bool) -> Self {
+    pub unsafe fn new<S: Simd>(place: &Place, radii: S::F, inner: bool, ends: bool) -> Self {
         let mut rects = Rects { stride: place.stride, rows: place.rows, ..Rects::default() };
-        let &Bounds { x, y } = bounds;
         // SAFETY: as the caller's; floats hold indices exactly.
         unsafe {
             let (zero, one) = (S::splat(0.0), S::splat(1.0));
+            let at = S::add(S::load(STEPS.as_ptr()), S::splat((place.x - place.left) as f32));
+            let x = range::<S>(at, radii, -(place.left as f32), place.image[0] as f32);
+            let y = range::<S>(zero, radii, -(place.y as f32), place.image[1] as f32);
             let edge = if inner { one } else { zero };
             let (left, right) = (S::add(x[0], edge), S::sub(x[1], edge));
             let above = row_start::<S>(place, S::sub(S::add(y[0], edge), one));

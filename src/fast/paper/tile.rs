@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::integrals::{Rings, rows_of_rings};
 use super::methods::{Sums, by_number};
-use super::rects::{Bounds, Place, Rects};
+use super::rects::{Place, Rects};
 use crate::cloud::Points;
 use crate::fast::sink::Sink;
 use crate::fast::tile::{Bits, Octet};
@@ -14,23 +14,6 @@ use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
 use crate::paper::{CleanPoints, Cleaned, Rect, plain_estimate, window};
 use crate::simd::{GROUP, Simd};
-
-/// A row's windows: their radii, 0 for none, readable up to a whole group; or the windows themselves.
-#[derive(Clone, Copy)]
-pub(crate) enum Windows<'a> {
-    Radii(&'a [f32]),
-    Rects(&'a [Option<Rect>]),
-}
-
-impl Windows<'_> {
-    /// The window of a pixel that has one.
-    fn rect(&self, (x, y): (usize, usize), width: usize, height: usize) -> Rect {
-        match self {
-            Windows::Radii(radii) => window((x, y), radii[x] as usize, width, height),
-            Windows::Rects(rects) => rects[x].clone().expect("a pixel with a window"),
-        }
-    }
-}
 
 /// A rectangle of the image whose normals are computed together.
 pub(crate) struct Tile<'a, F> {
@@ -41,11 +24,11 @@ pub(crate) struct Tile<'a, F> {
     pub whole_points: bool,
     /// How far a window reaches from its pixel at most.
     pub largest: usize,
-    /// A row's depths and windows.
+    /// A row's depths, and the radii of its windows, 0 for none; both can be read up to a whole group.
     pub row: F,
 }
 
-impl<'a, F: Fn(usize) -> (&'a [f32], Windows<'a>)> Tile<'a, F> {
+impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
     /// # Safety
     /// The processor has the instruction set of `S`; no one else writes the tile's pixels.
     #[inline(always)]
@@ -108,7 +91,8 @@ impl<'a, F: Fn(usize) -> (&'a [f32], Windows<'a>)> Tile<'a, F> {
         let image = [self.points.width(), self.points.height()];
         let (left, stride, rows) = (rings.left(), rings.stride(), rings.rows);
         let (points, sums) = rings.parts();
-        let row = (self.row)(y).1;
+        let radii = (self.row)(y).1;
+        let rect = |x: usize| window((x, y), radii[x] as usize, image[0], image[1]);
         let cleaned =
             Cleaned { points: self.points, zero_is_missing: self.options.zero_is_missing };
         for x in self.columns.clone().step_by(GROUP) {
@@ -116,19 +100,13 @@ impl<'a, F: Fn(usize) -> (&'a [f32], Windows<'a>)> Tile<'a, F> {
             let place = Place { image, x, y, left, stride, rows };
             // SAFETY: as the caller's; the rings hold what the windows of the tile's pixels need.
             unsafe {
-                let (windows, bounds) = match row {
-                    Windows::Radii(radii) => {
-                        let radii = S::load(radii.as_ptr().add(x));
-                        let windows = S::bits(S::lt(S::splat(0.0), radii)) & ((1 << count) - 1);
-                        (windows, Bounds::of_radii(&place, radii))
-                    }
-                    Windows::Rects(rects) => Bounds::of_rects(&place, &rects[x..x + count]),
-                };
+                let eight = S::load(radii.as_ptr().add(x));
+                let windows = S::bits(S::lt(S::splat(0.0), eight)) & ((1 << count) - 1);
                 if windows == 0 {
                     sink.write_none(x, y, count);
                     continue;
                 }
-                let rects = Rects::new::<S>(&place, &bounds, M::INNER, M::ENDS);
+                let rects = Rects::new::<S>(&place, eight, M::INNER, M::ENDS);
                 let mut numbers = M::Numbers::default();
                 let mut todo = windows;
                 while todo != 0 {
@@ -147,7 +125,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], Windows<'a>)> Tile<'a, F> {
                     let found = M::normals::<S>(&numbers, &rects, error, windows, fresh);
                     let mut tried = 0;
                     for lane in Bits(found.doubtful & windows & !fresh) {
-                        let rect = row.rect((x + lane, y), image[0], image[1]);
+                        let rect = rect(x + lane);
                         let taken = M::afresh(&mut numbers, lane, &cleaned, &rect);
                         tried |= u32::from(taken) << lane;
                     }
@@ -163,7 +141,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], Windows<'a>)> Tile<'a, F> {
                 let mut normals =
                     Octet::of::<S>(found.normal, found.curvature, here, viewpoint, sure);
                 for lane in Bits(plain) {
-                    let rect = row.rect((x + lane, y), image[0], image[1]);
+                    let rect = rect(x + lane);
                     normals.put(lane, self.plain(&cleaned, (x + lane, y), &rect));
                 }
                 sink.write(x, y, count, &normals, M::CURVATURE);
