@@ -261,12 +261,12 @@ pub(crate) fn estimates(
 const CREASE_LEVELS: usize = 2;
 
 /// How far from a plane a point at a depth may lie to be on that surface, in inverse depth: half a depth change.
-fn tolerance(depth: f32, options: &Options) -> f64 {
+fn tolerance(depth: f32, options: &Options) -> f32 {
     let change = match options.semantics {
         Semantics::Paper => {
             options.paper.gamma * smoothing_area::smallest_depth_change(depth, &options.paper)
         }
         Semantics::Pcl => crate::depth_change::threshold(depth, options.max_depth_change_factor),
     };
-    f64::from(change / (depth * depth)) / 2.0
+    change / (depth * depth) / 2.0
 }

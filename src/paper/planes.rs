@@ -29,13 +29,6 @@ pub(crate) struct Plane {
     pub unevenness: f64,
 }
 
-/// The mean position and inverse depth of some points, and their number.
-pub(crate) struct Mean {
-    pub position: [f64; 2],
-    pub inverse_depth: f64,
-    pub points: f64,
-}
-
 impl InverseDepths {
     pub fn new(cloud: &Cloud) -> Self {
         let (width, height) = (cloud.width, cloud.height);
@@ -74,14 +67,6 @@ impl InverseDepths {
             yy - two * y0 * y + y0 * y0 * n,
         ]
         .map(|sum| f64::from(sum.0))
-    }
-
-    /// None if there is no finite point.
-    pub fn mean(&self, rect: &Rect) -> Option<Mean> {
-        let [n, x, y, ..] = self.moments(rect);
-        let [r, ..] = self.depths.sum(rect);
-        let position = [rect.x.start as f64 + x / n, rect.y.start as f64 + y / n];
-        (n > 0.0).then_some(Mean { position, inverse_depth: r / n, points: n })
     }
 
     /// None if there are too few points to tell how well the plane fits, or if they are on one line of the image.
