@@ -9,7 +9,7 @@ use crate::isa::Isa;
 use crate::methods::{Estimate, covariance_matrix, estimate, estimate_window};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
-use crate::paper::{self, PaperMaps, with_missing_as_nan};
+use crate::paper::{self, Asked, Cloud, EvenWindow, PaperMaps, with_missing_as_nan};
 use crate::smoothing_area::window_side;
 use crate::window::Image;
 
@@ -373,6 +373,13 @@ impl paper::Engine for Engine<'_> {
             Ok(())
         })?;
         Ok((radii, estimates))
+    }
+
+    fn even_windows(&mut self, cloud: &Cloud, asked: &Asked) -> Result<Vec<EvenWindow>, Error> {
+        if self.is_plain {
+            return Ok(paper::even_windows(cloud, asked));
+        }
+        fast::paper::even_windows(self.isa, cloud, asked, self.options.threads, self.scratch)
     }
 
     fn of_radii(&mut self, radii: &[u32]) -> Result<Vec<Estimate>, Error> {

@@ -11,7 +11,7 @@
 use std::ops::Range;
 
 use super::cloud::Cloud;
-use super::planes::InverseDepths;
+use super::planes::{Plane, inverse_depth};
 use super::rect::Rect;
 
 /// Where there are depth changes, row by row.
@@ -63,14 +63,14 @@ impl DepthChanges {
 
     /// Without the changes that the slope of the surface on both sides explains: on a steep surface neighbours are
     /// as far apart as across an edge.
-    pub fn not_explained(&self, cloud: &Cloud, planes: &InverseDepths) -> DepthChanges {
+    pub fn not_explained(&self, cloud: &Cloud) -> DepthChanges {
         /// How far the surface is looked at along and across a change, in pixels.
         const ALONG: usize = 5;
         const ACROSS: usize = 2;
         /// With the sensor's noise along the rows and columns, neighbours differ by up to this many times the slope.
         const JITTER: f64 = 4.0;
         let Self { width, height, .. } = *self;
-        let inverse = |at: usize| 1.0 / f64::from(cloud.depths[at]);
+        let inverse = |at: usize| f64::from(inverse_depth(cloud.depths[at]));
         // `at` is the last pixel before the change, the `i`-th of its row or column, which is the `j`-th; `step`
         // leads to the next one. `rect` makes a rectangle of ranges along and across.
         type MakeRect = fn(Range<usize>, Range<usize>) -> Rect;
@@ -85,7 +85,7 @@ impl DepthChanges {
             let (last, first) = (i + 1 - gap, i + 1);
             let before = rect((last + 1).saturating_sub(ALONG)..last + 1, across.clone());
             let after = rect(first..(first + ALONG).min(length), across);
-            let slope = |rect: &Rect| planes.plane(rect).map(|plane| plane.slope[axis].abs());
+            let slope = |rect: &Rect| Plane::of(cloud, rect).map(|plane| plane.slope[axis].abs());
             let slopes = [slope(&before), slope(&after)].into_iter().flatten();
             let slope = slopes.reduce(f64::min).unwrap_or(0.0);
             jump <= JITTER * slope * gap as f64

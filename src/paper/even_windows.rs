@@ -7,7 +7,7 @@
 //! window's plane, or a pixel that does not, bend it by some share of their deviation over L.
 
 use super::cloud::Cloud;
-use super::planes::InverseDepths;
+use super::planes::{Plane, inverse_depth};
 use super::rect::Rect;
 
 /// Inverse depths that deviate less than this many alpha from a plane are as good as in it.
@@ -15,7 +15,7 @@ const EVEN: f32 = 0.02;
 /// Small samples have, by chance, variances below the noise's. A window is even if its variance is at most this many
 /// standard deviations of a sample's variance above that of the window of half its radius; and the noise's variance is
 /// taken to be as far above the least one of all windows that a pixel can take.
-const CHANCE: f64 = 3.0;
+const CHANCE: f32 = 3.0;
 /// What the part of a window's variance that is not noise counts.
 const MISFIT: f32 = 3.0;
 /// What the squared distance of the points next to the pixel from the window's plane counts, where it is more than
@@ -26,9 +26,9 @@ const NEAR_NOISE: f32 = 4.0;
 /// still on one surface if its points deviate from the plane by less than the plane changes in this many pixels:
 /// across a true change it would be side / 6 pixels, so the window must have at least `JAGGED_RADIUS` and
 /// `JAGGED_POINTS` of its points.
-const JAGGED: f64 = 1.4;
-const JAGGED_RADIUS: usize = 2;
-const JAGGED_POINTS: f64 = 0.8;
+pub(crate) const JAGGED: f64 = 1.4;
+pub(crate) const JAGGED_RADIUS: u32 = 2;
+pub(crate) const JAGGED_POINTS: f64 = 0.8;
 /// How many pixels beyond its window's edge a plane may be taken for a pixel's: outlines are ragged.
 const REACH: u32 = 3;
 /// The sensor's noise along rows and columns, in pixels: it moves a point off a steep plane.
@@ -36,90 +36,109 @@ const JITTER: f32 = 4.0;
 
 /// A pixel's even window, and what it is worth.
 #[derive(Clone, Copy, Default)]
-struct EvenWindow {
+pub(crate) struct EvenWindow {
     /// 0 for no window.
-    radius: u32,
+    pub radius: u32,
     /// The plane's inverse depth at the pixel, and its change per pixel to the right and down.
-    inverse_depth: f32,
-    slope: [f32; 2],
+    pub inverse_depth: f32,
+    pub slope: [f32; 2],
     /// The mean square deviation from the plane, and the variance that it may be of.
-    unevenness: f32,
-    noise: f32,
+    pub unevenness: f32,
+    pub noise: f32,
     /// What one of noise and one of bend count.
-    per_noise: f32,
-    per_bend: f32,
+    pub per_noise: f32,
+    pub per_bend: f32,
 }
 
-/// The even windows of all pixels.
-pub(crate) struct EvenWindows<'a> {
-    cloud: &'a Cloud,
-    clean: &'a [u32],
-    /// Row by row.
-    windows: Vec<EvenWindow>,
+/// What windows are asked for, row by row.
+pub(crate) struct Asked<'a> {
+    /// The radius that the depth asks for, at most `limit`; 0 at a missing point.
+    pub wanted: &'a [u32],
+    /// The largest radius of a window without a depth change.
+    pub clean: &'a [u32],
+    /// The largest radius of all.
+    pub limit: u32,
     /// The smallest variance that is told from none.
-    least_noise: f32,
+    pub least_noise: f32,
 }
 
-/// The largest radius that an even window may have, where the depth asks for another one: twice that, since whether
-/// a pixel is on one side of a crease or on the other is told from less noise then.
-pub(crate) fn largest_radius(wanted: usize, limit: usize) -> usize {
-    (2 * wanted).min(limit).max(wanted)
-}
-
-impl<'a> EvenWindows<'a> {
-    /// The windows of pixels whose depth asks for the radius `wanted`, 0 for a missing point; windows up to the
-    /// radius `clean` have no depth change. None of a radius above `limit` unless it is wanted.
-    pub fn new(
-        cloud: &'a Cloud,
-        inverse: &InverseDepths,
-        clean: &'a [u32],
-        wanted: impl Fn(usize) -> usize,
-        limit: usize,
-        alpha: f32,
-    ) -> Self {
-        let size = (cloud.width, cloud.height);
-        let least_noise = (EVEN * alpha).powi(2);
-        let of_pixel = |pixel: (usize, usize)| {
-            let at = cloud.index(pixel.0, pixel.1);
-            let plane = |radius: usize| inverse.plane(&Rect::around(pixel, radius, size));
-            let (wanted, clean) = (wanted(at), clean[at] as usize);
-            let jagged = |radius: usize| {
-                let plane = plane(radius)?;
-                let points = Rect::around(pixel, radius, size).area() as f64;
-                let is_jagged = plane.unevenness <= (JAGGED * plane.steepness()).powi(2)
-                    && plane.points >= JAGGED_POINTS * points;
-                is_jagged.then_some((radius, plane))
-            };
-            let radii = std::iter::successors(Some(wanted), |radius| Some(radius * 7 / 10));
-            let mut radii = radii.take_while(|radius| *radius > clean && *radius >= JAGGED_RADIUS);
-            let (radius, plane) = radii.find_map(jagged).or_else(|| {
-                let mut radius = largest_radius(wanted, limit).min(clean);
-                let mut found = plane(radius)?;
-                while radius > 1
-                    && let Some(half) = plane(radius / 2)
-                    && found.unevenness > half.noise(CHANCE).max(f64::from(least_noise))
-                {
-                    (radius, found) = (radius / 2, half);
-                }
-                Some((radius, found))
-            })?;
-            let [x, y] = [pixel.0, pixel.1].map(|at| at as f64);
-            let per_bend = 1.0 / ((2 * radius + 1) as f64).powi(2);
-            Some(EvenWindow {
-                radius: radius as u32,
-                inverse_depth: plane.at([x, y]) as f32,
-                slope: plane.slope.map(|slope| slope as f32),
-                unevenness: plane.unevenness as f32,
-                noise: plane.noise(CHANCE) as f32,
-                per_noise: (12.0 / plane.points * per_bend) as f32,
-                per_bend: per_bend as f32,
-            })
-        };
-        let pixels = (0..size.1).flat_map(|y| (0..size.0).map(move |x| (x, y)));
-        let windows = pixels.map(|pixel| of_pixel(pixel).unwrap_or_default()).collect();
-        EvenWindows { cloud, clean, windows, least_noise }
+impl Asked<'_> {
+    /// The largest radius that a pixel's window may have: twice the wanted one, since whether a pixel is on one side
+    /// of a crease or on the other is told from less noise then.
+    pub fn largest(&self, at: usize) -> u32 {
+        (2 * self.wanted[at]).min(self.limit)
     }
 
+    /// The variance told from none where the sensor's smallest depth change is `alpha`.
+    pub fn least_noise(alpha: f32) -> f32 {
+        (EVEN * alpha).powi(2)
+    }
+}
+
+/// What a variance of this many points is multiplied with, to be one that noise may have.
+pub(crate) fn chance(points: f32) -> f32 {
+    1.0 + CHANCE * (2.0 / (points - 3.0)).sqrt()
+}
+
+/// The even windows of all pixels, row by row: the plain form.
+pub(crate) fn even_windows(cloud: &Cloud, asked: &Asked) -> Vec<EvenWindow> {
+    let pixels = (0..cloud.height).flat_map(|y| (0..cloud.width).map(move |x| (x, y)));
+    pixels.map(|pixel| even_window(cloud, asked, pixel).unwrap_or_default()).collect()
+}
+
+fn even_window(cloud: &Cloud, asked: &Asked, pixel: (usize, usize)) -> Option<EvenWindow> {
+    let at = cloud.index(pixel.0, pixel.1);
+    let (wanted, clean) = (asked.wanted[at], asked.clean[at]);
+    let rect = |radius: u32| Rect::around(pixel, radius as usize, (cloud.width, cloud.height));
+    let plane = |radius: u32| Plane::of(cloud, &rect(radius));
+    let jagged = |radius: u32| {
+        let plane = plane(radius)?;
+        let is_jagged = plane.unevenness <= JAGGED * JAGGED * plane.steepness_squared()
+            && plane.points >= JAGGED_POINTS * rect(radius).area() as f64;
+        is_jagged.then_some((radius, plane))
+    };
+    let radii = std::iter::successors(Some(wanted), |radius| Some(radius * 7 / 10));
+    let mut radii = radii.take_while(|radius| *radius > clean && *radius >= JAGGED_RADIUS);
+    let noise = |plane: &Plane| plane.unevenness * f64::from(chance(plane.points as f32));
+    let (radius, plane) = radii.find_map(jagged).or_else(|| {
+        let mut radius = asked.largest(at).min(clean);
+        let mut found = plane(radius)?;
+        while radius > 1
+            && let Some(half) = plane(radius / 2)
+            && found.unevenness > noise(&half).max(f64::from(asked.least_noise))
+        {
+            (radius, found) = (radius / 2, half);
+        }
+        Some((radius, found))
+    })?;
+    let [x, y] = [pixel.0, pixel.1].map(|at| at as f64);
+    Some(EvenWindow {
+        inverse_depth: plane.at([x, y]) as f32,
+        slope: plane.slope.map(|slope| slope as f32),
+        unevenness: plane.unevenness as f32,
+        noise: noise(&plane) as f32,
+        ..EvenWindow::worth(radius, plane.points as f32)
+    })
+}
+
+impl EvenWindow {
+    /// A window of a radius with so many points.
+    pub fn worth(radius: u32, points: f32) -> Self {
+        let side = (2 * radius + 1) as f32;
+        let per_bend = 1.0 / (side * side);
+        EvenWindow { radius, per_noise: 12.0 / points * per_bend, per_bend, ..Self::default() }
+    }
+}
+
+/// The even windows of all pixels, to choose from.
+pub(crate) struct EvenWindows<'a> {
+    pub cloud: &'a Cloud,
+    pub asked: &'a Asked<'a>,
+    /// Row by row.
+    pub windows: Vec<EvenWindow>,
+}
+
+impl EvenWindows<'_> {
     /// The radius of a pixel's window; 0 for none.
     pub fn radius(&self, at: usize) -> u32 {
         self.windows[at].radius
@@ -131,7 +150,7 @@ impl<'a> EvenWindows<'a> {
     pub fn best(
         &self,
         pixel: (usize, usize),
-        radii: impl Iterator<Item = usize>,
+        radii: impl Iterator<Item = u32>,
         tolerance: f32,
         found: &mut Vec<Candidate>,
     ) -> Option<usize> {
@@ -164,7 +183,7 @@ impl<'a> EvenWindows<'a> {
             }
         }
 
-        let noise = noise.max(self.least_noise);
+        let noise = noise.max(self.asked.least_noise);
         let near = self.near(pixel);
         let point = 1.0 / cloud.depths[own];
         let mut best: Option<(f32, usize)> = None;
@@ -195,13 +214,13 @@ impl<'a> EvenWindows<'a> {
     /// The mean of the pixel and those next to it, but of the pixel alone if there is a depth change among them.
     fn near(&self, (x, y): (usize, usize)) -> Near {
         let cloud = self.cloud;
-        let reach = self.clean[cloud.index(x, y)].min(1) as usize;
+        let reach = self.asked.clean[cloud.index(x, y)].min(1) as usize;
         let (mut sums, mut points) = ([0.0; 3], 0.0);
         for (column, row) in Rect::around((x, y), reach, (cloud.width, cloud.height)).pixels() {
-            let depth = cloud.depths[cloud.index(column, row)];
-            if !depth.is_nan() {
+            let inverse = inverse_depth(cloud.depths[cloud.index(column, row)]);
+            if !inverse.is_nan() {
                 let offset = [column as f32 - x as f32, row as f32 - y as f32];
-                for (sum, value) in sums.iter_mut().zip([1.0 / depth, offset[0], offset[1]]) {
+                for (sum, value) in sums.iter_mut().zip([inverse, offset[0], offset[1]]) {
                     *sum += value;
                 }
                 points += 1.0;

@@ -16,16 +16,18 @@ pub(crate) mod smoothing_area;
 mod summed_area;
 mod surroundings;
 
-pub(crate) use cloud::{CleanPoints, Cleaned};
+pub(crate) use cloud::{CleanPoints, Cleaned, Cloud};
+pub(crate) use even_windows::{
+    Asked, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, chance, even_windows,
+};
 pub(crate) use methods::estimate as plain_estimate;
+pub(crate) use planes::{Plane, inverse_depth};
 pub(crate) use rect::Rect;
 pub(crate) use smoothing_area::window;
 
-use cloud::Cloud;
 use creases::SummedNormals;
 use depth_change::DepthChanges;
-use even_windows::{EvenWindows, largest_radius};
-use planes::InverseDepths;
+use even_windows::EvenWindows;
 
 use crate::Error;
 use crate::cloud::Points;
@@ -129,6 +131,9 @@ pub(crate) trait Engine {
     /// Every pixel's window, 0 for none, as a radius, or in PCL's semantics as a side; and its estimate.
     fn windows(&mut self) -> Result<(Vec<u32>, Vec<Estimate>), Error>;
 
+    /// The even windows of all pixels.
+    fn even_windows(&mut self, cloud: &Cloud, asked: &Asked) -> Result<Vec<EvenWindow>, Error>;
+
     /// The estimates of other windows, for the pixels that have one, by their radii.
     fn of_radii(&mut self, radii: &[u32]) -> Result<Vec<Estimate>, Error>;
 }
@@ -141,6 +146,14 @@ fn wanted_size(cloud: &Cloud, options: &Options, at: usize) -> u32 {
         Semantics::Pcl => {
             crate::smoothing_area::window_side(f32::INFINITY, cloud.points[at][2], options)
         }
+    }
+}
+
+/// The radius of a window of a size as [`Engine::windows`] gives them.
+fn radius_of_size(size: u32, options: &Options) -> u32 {
+    match options.semantics {
+        Semantics::Paper => size,
+        Semantics::Pcl => size / 2,
     }
 }
 
@@ -195,23 +208,26 @@ pub(crate) fn estimates(
     }
     let cloud = Cloud::new(points, options);
     let (width, height) = (cloud.width, cloud.height);
-    let wanted_radius = |at: usize| match options.semantics {
-        Semantics::Paper => wanted_size(&cloud, options, at) as usize,
-        Semantics::Pcl => wanted_size(&cloud, options, at) as usize / 2,
+    let wanted: Vec<u32> = (0..width * height).map(|at| wanted_size(&cloud, options, at)).collect();
+    let clean = depth_changes(&cloud, options).not_explained(&cloud).clean_radii();
+    let limit = options.paper.largest_radius;
+    let radius = |size: &u32| radius_of_size(*size, options).min(limit);
+    let wanted_radii: Vec<u32> = wanted.iter().map(radius).collect();
+    let asked = Asked {
+        wanted: &wanted_radii,
+        clean: &clean,
+        limit,
+        least_noise: Asked::least_noise(options.paper.alpha),
     };
-    let limit = options.paper.largest_radius as usize;
-    let inverse = InverseDepths::new(&cloud);
-    let changes = depth_changes(&cloud, options).not_explained(&cloud, &inverse);
-    let clean = changes.clean_radii();
-    let alpha = options.paper.alpha;
-    let even = EvenWindows::new(&cloud, &inverse, &clean, wanted_radius, limit, alpha);
+    let windows = engine.even_windows(&cloud, &asked)?;
+    let even = EvenWindows { cloud: &cloud, asked: &asked, windows };
     let normals = options.crease_windows.then(|| SummedNormals::new(&estimates, width, height));
 
     // The pixels that another pixel's window may serve better, and which one; that, or none.
     let mut moved: Vec<(usize, Option<usize>)> = Vec::new();
     let mut found = Vec::new();
     for at in (0..width * height).filter(|at| !cloud.is_missing(*at)) {
-        let is_cut = options.one_sided_windows && sizes[at] < wanted_size(&cloud, options, at);
+        let is_cut = options.one_sided_windows && sizes[at] < wanted[at];
         let is_near_crease = || {
             sizes[at] > 0
                 && normals.as_ref().is_some_and(|normals| {
@@ -219,8 +235,7 @@ pub(crate) fn estimates(
                 })
         };
         if is_cut || is_near_crease() {
-            let largest = largest_radius(wanted_radius(at), limit);
-            let halves = std::iter::successors(Some(largest), |radius| Some(radius / 2));
+            let halves = std::iter::successors(Some(asked.largest(at)), |radius| Some(radius / 2));
             let radii = halves.take_while(|radius| *radius > 0);
             let levels = if is_cut { usize::MAX } else { CREASE_LEVELS };
             let tolerance = tolerance(cloud.depths[at], options);

@@ -5,6 +5,7 @@ use std::ops::Range;
 use crate::cloud::Points;
 use crate::fast::lanes::transpose4;
 use crate::fast::planes::grow;
+use crate::paper::inverse_depth;
 use crate::simd::{GROUP, Simd};
 
 /// x, y, z, and 1; zeros for a missing point.
@@ -145,6 +146,18 @@ impl<const N: usize> Rings<N> {
             self.largest = lanes.into_iter().fold(0.0, f32::max);
         }
         to[count..].fill([0.0; 4]);
+    }
+
+    /// Reads the row of `depths` as points whose x is the column in the rings, whose y is given, and whose z is the
+    /// inverse depth.
+    pub fn read_positions(&mut self, y: usize, of_row: f32, depths: &[f32]) {
+        let row = self.row(y);
+        let to = &mut self.points[row][1..];
+        for (x, (to, depth)) in to.iter_mut().zip(depths).enumerate() {
+            let inverse = inverse_depth(*depth);
+            *to = if inverse.is_nan() { [0.0; 4] } else { [x as f32, of_row, inverse, 1.0] };
+        }
+        to[depths.len()..].fill([0.0; 4]);
     }
 
     /// Has no points in row `y`: it is outside the image.

@@ -2,15 +2,18 @@
 //! then tile by tile integral images of the method's channels (`integrals`, `methods`) and the normals (`tile`).
 
 mod depths;
+mod even_windows;
 mod integrals;
 mod methods;
 mod rects;
 mod tile;
 mod windows;
 
+use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use depths::row_length;
+use even_windows::EvenTile;
 use integrals::{Rings, rows_of_rings};
 use methods::{CovarianceMatrix, Gradients, MOMENTS, SmoothedDepthChanges};
 use tile::Tile;
@@ -23,7 +26,7 @@ use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::options::{DistanceMetric, Method, Options};
-use crate::paper::PaperMaps;
+use crate::paper::{Asked, Cloud, EvenWindow, PaperMaps};
 use crate::simd::{GROUP, Simd};
 
 /// Elements of a tile's rings at most: floats hold their indices. Room for the largest windows there are.
@@ -112,6 +115,68 @@ pub(crate) fn compute_of_radii(
     job.depths(scratch)?;
     let largest = job.given_radii(scratch, radii)?;
     job.tiles(scratch, None, normals, largest)
+}
+
+/// The even windows of all pixels, row by row.
+pub(crate) fn even_windows(
+    isa: Isa,
+    cloud: &Cloud,
+    asked: &Asked,
+    threads: usize,
+    scratch: &mut super::Scratch,
+) -> Result<Vec<EvenWindow>, Error> {
+    scratch.workers.prepare(threads)?;
+    let super::Scratch { workers, each, .. } = scratch;
+    each.resize_with(workers.count().max(each.len()), Default::default);
+    let &Cloud { width, height, ref depths, .. } = cloud;
+    let mut windows = vec![EvenWindow::default(); width * height];
+    let image = Parts(windows.as_mut_ptr());
+    let radius = |at: usize| asked.largest(at).min(asked.clean[at]).max(asked.wanted[at]);
+    let largest = (0..width * height).map(radius).max().unwrap_or(0) as usize;
+    let grid = Grid::new(width, height, largest, Rings::<MOMENTS>::COLUMN);
+    workers.for_each(grid.count(), |worker, item| {
+        let Some((columns, rows)) = grid.tile(item) else { return };
+        let tile = EvenTile { depths, asked, width, height, columns, rows, largest };
+        let rings = &mut lock(&each[worker]).paper.moments;
+        // SAFETY: the processor has the instruction set, and tiles do not share pixels.
+        unsafe { paths::run(isa, EvenTask { tile: &tile, rings, image: &image }) };
+    });
+    Ok(windows)
+}
+
+/// The image in tiles of like sizes, whose rings stay in the cache.
+struct Grid {
+    width: usize,
+    height: usize,
+    /// Of a tile.
+    columns: usize,
+    rows: usize,
+    across: usize,
+    down: usize,
+}
+
+impl Grid {
+    /// Tiles for windows that reach `largest` from their pixels at most, in rings of so many bytes a column and row.
+    fn new(width: usize, height: usize, largest: usize, column: usize) -> Self {
+        let ring = rows_of_rings(largest, height);
+        let columns = (TILE_BYTES / (column * ring)).max(4 * largest);
+        let columns = columns.min(MOST_INDICES / ring - 2 * largest - 4 * GROUP);
+        let across = width.div_ceil(columns.next_multiple_of(GROUP));
+        let columns = width.div_ceil(across).next_multiple_of(GROUP);
+        let down = height.div_ceil(TILE_ROWS);
+        Grid { width, height, columns, rows: height.div_ceil(down), across, down }
+    }
+
+    fn count(&self) -> usize {
+        self.across * self.down
+    }
+
+    /// The columns and rows of a tile; none where the tiles before have covered all.
+    fn tile(&self, item: usize) -> Option<(Range<usize>, Range<usize>)> {
+        let (row, column) = (item / self.across * self.rows, item % self.across * self.columns);
+        let columns = column..(column + self.columns).min(self.width);
+        (column < self.width).then(|| (columns, row..(row + self.rows).min(self.height)))
+    }
 }
 
 /// One computation.
@@ -225,29 +290,10 @@ impl<'a> Job<'a> {
             let at = (chunk.start + y - chunk.swept.start) * length;
             (&depths[y * length..][..length], &radii[at..at + length])
         };
-        let ring = rows_of_rings(largest, height);
-        let columns = (TILE_BYTES / (column(options.method) * ring)).max(4 * largest);
-        let columns = columns.min(MOST_INDICES / ring - 2 * largest - 4 * GROUP);
-        let columns = columns.next_multiple_of(GROUP);
-        let across = width.div_ceil(columns);
-        // Tiles of like widths.
-        let columns = width.div_ceil(across).next_multiple_of(GROUP);
-        let down = height.div_ceil(TILE_ROWS);
-        let rows = height.div_ceil(down);
-        workers.for_each(across * down, |worker, item| {
-            let (first, column) = (item / across * rows, item % across * columns);
-            if column >= width {
-                return;
-            }
-            let tile = Tile {
-                points,
-                options,
-                columns: column..(column + columns).min(width),
-                rows: first..(first + rows).min(height),
-                whole_points,
-                largest,
-                row,
-            };
+        let grid = Grid::new(width, height, largest, column(options.method));
+        workers.for_each(grid.count(), |worker, item| {
+            let Some((columns, rows)) = grid.tile(item) else { return };
+            let tile = Tile { points, options, columns, rows, whole_points, largest, row };
             let scratch = &mut lock(&each[worker]).paper;
             // SAFETY: the processor has the instruction set, and tiles do not share pixels.
             unsafe { paths::run(self.isa, TileTask { tile: &tile, scratch, sink: &sink }) };
@@ -333,5 +379,22 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Task for TileTask<'a, '_, F> {
                 }
             }
         }
+    }
+}
+
+/// The even windows of one tile; no one else writes its pixels.
+struct EvenTask<'a, 't> {
+    tile: &'t EvenTile<'a>,
+    rings: &'t mut Rings<MOMENTS>,
+    image: &'t Parts<EvenWindow>,
+}
+
+impl Task for EvenTask<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) {
+        // SAFETY: as the caller's.
+        unsafe { self.tile.compute::<S>(self.rings, self.image) };
     }
 }

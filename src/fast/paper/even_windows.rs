@@ -1,0 +1,313 @@
+//! Even windows, fast, for one tile of the image: the plain form is in `paper::even_windows`. Planes come from integral
+//! images of the moments of positions and inverse depths, eight pixels at a time.
+
+use std::ops::Range;
+
+use super::integrals::{Channels, Counted, Rings, rows_of_rings};
+use super::methods::MOMENTS;
+use super::rects::{Place, Rects};
+use crate::fast::Parts;
+use crate::fast::arithmetic::{Doubles, Floats};
+use crate::fast::tile::Bits;
+use crate::paper::{Asked, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, Plane, chance};
+use crate::paper::{inverse_depth, window};
+use crate::simd::{GROUP, Simd};
+
+/// A rectangle of the image whose even windows are found together.
+pub(super) struct EvenTile<'a> {
+    /// Row by row, as `asked` is.
+    pub depths: &'a [f32],
+    pub asked: &'a Asked<'a>,
+    pub width: usize,
+    pub height: usize,
+    pub columns: Range<usize>,
+    pub rows: Range<usize>,
+    /// The largest radius of a window.
+    pub largest: usize,
+}
+
+/// Moments of the positions, from the rings' first on, and of the inverse depths, from one of the tile's on.
+struct Positions {
+    top: usize,
+    origin: f64,
+}
+
+impl Channels<MOMENTS> for Positions {
+    #[inline(always)]
+    fn of(&self, own: &Counted, _: [&Counted; 2], _: [&Counted; 2]) -> [f64; MOMENTS] {
+        let [x, y, r, count] = own.map(f64::from);
+        let r = (r - self.origin) * count;
+        [x, y, r, count, x * x, x * y, x * r, y * y, y * r, r * r]
+    }
+}
+
+/// Eight windows and their planes.
+#[derive(Clone, Copy)]
+struct Fits<S: Simd> {
+    /// Of the planes at the pixels.
+    inverse_depth: Doubles<S>,
+    slope: [Doubles<S>; 2],
+    points: Doubles<S>,
+    unevenness: Doubles<S>,
+    /// The variance that the unevenness may be of.
+    noise: Doubles<S>,
+}
+
+impl<S: Simd> Fits<S> {
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn none() -> Self {
+        // SAFETY: as the caller's.
+        let zero = unsafe { Doubles::splat(0.0) };
+        let slope = [zero; 2];
+        Fits { inverse_depth: zero, slope, points: zero, unevenness: zero, noise: zero }
+    }
+
+    /// Takes the lanes of another.
+    #[inline(always)]
+    fn take(&mut self, lanes: u32, other: &Self) {
+        let Fits { inverse_depth, slope, points, unevenness, noise } = self;
+        let [across, down] = slope;
+        let to = [inverse_depth, across, down, points, unevenness, noise];
+        let [across, down] = other.slope;
+        let Fits { inverse_depth, points, unevenness, noise, .. } = *other;
+        let from = [inverse_depth, across, down, points, unevenness, noise];
+        for (to, from) in to.into_iter().zip(from) {
+            // SAFETY: there is a group, so there is the instruction set.
+            to.0 = unsafe { S::select_bits_d(lanes, from.0, to.0) };
+        }
+    }
+
+    /// The windows of these radii, 0 for none.
+    #[inline(always)]
+    fn windows(&self, radii: &[u32; GROUP]) -> [EvenWindow; GROUP] {
+        let Fits { inverse_depth, slope: [across, down], points, unevenness, noise } = *self;
+        let mut fields = [[0.0; GROUP]; 6];
+        let values = [inverse_depth, across, down, points, unevenness, noise];
+        for (field, value) in fields.iter_mut().zip(values) {
+            // SAFETY: there is a group, so there is the instruction set.
+            unsafe { S::store(field.as_mut_ptr(), value.narrow().0) };
+        }
+        let mut windows = [EvenWindow::default(); GROUP];
+        for lane in 0..GROUP {
+            if radii[lane] > 0 {
+                let [inverse_depth, across, down, points, unevenness, noise] =
+                    fields.each_ref().map(|field| field[lane]);
+                let slope = [across, down];
+                let worth = EvenWindow::worth(radii[lane], points);
+                windows[lane] = EvenWindow { inverse_depth, slope, unevenness, noise, ..worth };
+            }
+        }
+        windows
+    }
+}
+
+impl EvenTile<'_> {
+    /// Writes the windows, row by row, to the image that they are part of.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`; no one else writes the tile's pixels.
+    #[inline(always)]
+    pub unsafe fn compute<S: Simd>(&self, rings: &mut Rings<MOMENTS>, image: &Parts<EvenWindow>) {
+        let reach = self.largest;
+        let columns =
+            self.columns.start.saturating_sub(reach)..(self.columns.end + reach).min(self.width);
+        let (top, bottom) =
+            (self.rows.start.saturating_sub(reach), (self.rows.end + reach).min(self.height));
+        let positions = Positions { top, origin: f64::from(self.origin()) };
+        rings.start(columns.clone(), top, rows_of_rings(reach, self.height));
+        let mut next = top;
+        for y in self.rows.clone() {
+            while next < (y + reach + 1).min(bottom) {
+                let depths = &self.depths[next * self.width..][columns.clone()];
+                rings.read_positions(next, (next - top) as f32, depths);
+                rings.push(&positions, next);
+                next += 1;
+            }
+            for x in self.columns.clone().step_by(GROUP) {
+                let first = y * self.width + x;
+                let count = (self.columns.end - x).min(GROUP);
+                // SAFETY: as the caller's.
+                unsafe {
+                    let windows = self.eight::<S>(rings, &positions, (x, y), count);
+                    image.part(first..first + count).copy_from_slice(&windows[..count]);
+                }
+            }
+        }
+    }
+
+    /// An inverse depth of the tile: sums about it lose less.
+    fn origin(&self) -> f32 {
+        let row = |y: usize| &self.depths[y * self.width..][self.columns.clone()];
+        let inverse = self.rows.clone().flat_map(row).map(|depth| inverse_depth(*depth));
+        inverse.into_iter().find(|r| !r.is_nan()).unwrap_or(0.0)
+    }
+
+    /// The windows of eight pixels, of which only the first `count` mean something.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`; the rings hold what the windows need.
+    #[inline(always)]
+    unsafe fn eight<S: Simd>(
+        &self,
+        rings: &Rings<MOMENTS>,
+        positions: &Positions,
+        pixel: (usize, usize),
+        count: usize,
+    ) -> [EvenWindow; GROUP] {
+        let first = pixel.1 * self.width + pixel.0;
+        let (mut wanted, mut clean, mut largest) = ([0; GROUP], [0; GROUP], [0; GROUP]);
+        for lane in 0..count {
+            wanted[lane] = self.asked.wanted[first + lane];
+            clean[lane] = self.asked.clean[first + lane];
+            largest[lane] = self.asked.largest(first + lane).min(clean[lane]);
+        }
+        // SAFETY: as the caller's.
+        unsafe {
+            let mut found = Fits::<S>::none();
+            let mut windows = [0; GROUP];
+            // On steep surfaces, windows with depth changes.
+            let mut radii = wanted;
+            let mut todo = above(&radii, &clean) & above(&radii, &[JAGGED_RADIUS - 1; GROUP]);
+            let mut done = 0;
+            while todo != 0 {
+                let (fits, there) = self.fits::<S>(rings, positions, pixel, &radii, todo);
+                let jagged = there & self.jagged(&fits, pixel, &radii, count);
+                found.take(jagged, &fits);
+                take(jagged, &mut windows, &radii);
+                done |= jagged;
+                for radius in &mut radii {
+                    *radius = *radius * 7 / 10;
+                }
+                todo &= !jagged & above(&radii, &clean);
+                todo &= above(&radii, &[JAGGED_RADIUS - 1; GROUP]);
+            }
+            // Windows without, and smaller ones while those are much more even.
+            radii = largest;
+            todo = !done & above(&radii, &[0; GROUP]);
+            let least = Doubles::splat(f64::from(self.asked.least_noise));
+            let mut is_first = true;
+            while todo != 0 {
+                let (fits, there) = self.fits::<S>(rings, positions, pixel, &radii, todo);
+                todo = there;
+                if !is_first {
+                    todo &= fits.noise.max(least).lt(found.unevenness);
+                }
+                found.take(todo, &fits);
+                take(todo, &mut windows, &radii);
+                todo &= above(&radii, &[1; GROUP]);
+                for radius in &mut radii {
+                    *radius /= 2;
+                }
+                is_first = false;
+            }
+            found.windows(&windows)
+        }
+    }
+
+    /// Planes through the points of eight windows, and the lanes that have one.
+    ///
+    /// # Safety
+    /// As [`EvenTile::eight`]'s.
+    #[inline(always)]
+    unsafe fn fits<S: Simd>(
+        &self,
+        rings: &Rings<MOMENTS>,
+        positions: &Positions,
+        (x, y): (usize, usize),
+        radii: &[u32; GROUP],
+        lanes: u32,
+    ) -> (Fits<S>, u32) {
+        let (left, stride, rows) = (rings.left(), rings.stride(), rings.rows);
+        let place = Place { image: [self.width, self.height], x, y, left, stride, rows };
+        let (_, sums) = rings.parts();
+        let mut numbers = [[0.0; GROUP]; MOMENTS];
+        // SAFETY: as the caller's.
+        unsafe {
+            let floats = radii.map(|radius| radius as f32);
+            let rects = Rects::new::<S>(&place, S::load(floats.as_ptr()), false, false);
+            for lane in Bits(lanes) {
+                let [a, b, c, d] =
+                    rects.corners.each_ref().map(|i| sums.get_unchecked(i[lane] as usize));
+                for i in 0..MOMENTS {
+                    numbers[i][lane] = (d[i] - c[i]) - (b[i] - a[i]);
+                }
+            }
+            let mut sums = [Doubles::<S>::splat(0.0); MOMENTS];
+            for i in 0..MOMENTS {
+                sums[i] = Doubles(S::load_d(numbers[i].as_ptr()));
+            }
+            let [sx, sy, sr, n, xx, xy, xr, yy, yr, rr] = sums;
+            let (mx, my, mr) = (sx / n, sy / n, sr / n);
+            let (xx, xy, yy) = (xx - sx * mx, xy - sx * my, yy - sy * my);
+            let (xr, yr, rr) = (xr - sx * mr, yr - sy * mr, rr - sr * mr);
+            let determinant = xx * yy - xy * xy;
+            let there = Doubles::splat(Plane::FEWEST - 0.5).lt(n)
+                & (Doubles::splat(Plane::LINE) * xx * yy).lt(determinant)
+                & lanes;
+            let slope = [(xr * yy - yr * xy) / determinant, (yr * xx - xr * xy) / determinant];
+            let deviation = rr - slope[0] * xr - slope[1] * yr;
+            let unevenness = deviation.max(Doubles::splat(0.0)) / (n - Doubles::splat(3.0));
+            let (mut points, mut chances) = ([0.0; GROUP], [0.0; GROUP]);
+            S::store(points.as_mut_ptr(), n.narrow().0);
+            for lane in 0..GROUP {
+                chances[lane] = chance(points[lane]);
+            }
+            let noise = unevenness * Floats::<S>(S::load(chances.as_ptr())).widen();
+            // The pixels' own positions.
+            let mut columns = [0.0; GROUP];
+            for (lane, column) in columns.iter_mut().enumerate() {
+                *column = (x - left + lane) as f64;
+            }
+            let columns = Doubles(S::load_d(columns.as_ptr()));
+            let row = Doubles::splat((y - positions.top) as f64);
+            let mean = Doubles::splat(positions.origin) + mr;
+            let inverse_depth = mean + slope[0] * (columns - mx) + slope[1] * (row - my);
+            (Fits { inverse_depth, slope, points: n, unevenness, noise }, there)
+        }
+    }
+
+    /// The lanes whose points are in their plane but for the sensor's noise along rows and columns.
+    ///
+    /// # Safety
+    /// As [`EvenTile::eight`]'s.
+    #[inline(always)]
+    unsafe fn jagged<S: Simd>(
+        &self,
+        fits: &Fits<S>,
+        (x, y): (usize, usize),
+        radii: &[u32; GROUP],
+        count: usize,
+    ) -> u32 {
+        let mut fewest = [0.0; GROUP];
+        for lane in 0..count {
+            let rect = window((x + lane, y), radii[lane] as usize, self.width, self.height);
+            fewest[lane] = JAGGED_POINTS * rect.area() as f64;
+        }
+        let [a, b] = fits.slope;
+        // SAFETY: as the caller's.
+        unsafe {
+            let limit = Doubles::splat(JAGGED * JAGGED) * (a * a + b * b);
+            let fewest = Doubles(S::load_d(fewest.as_ptr()));
+            !limit.lt(fits.unevenness) & !fits.points.lt(fewest)
+        }
+    }
+}
+
+/// The lanes in which one is above the other.
+#[inline(always)]
+fn above(values: &[u32; GROUP], others: &[u32; GROUP]) -> u32 {
+    let mut lanes = 0;
+    for lane in 0..GROUP {
+        lanes |= u32::from(values[lane] > others[lane]) << lane;
+    }
+    lanes
+}
+
+#[inline(always)]
+fn take(lanes: u32, windows: &mut [u32; GROUP], radii: &[u32; GROUP]) {
+    for lane in Bits(lanes) {
+        windows[lane] = radii[lane];
+    }
+}
