@@ -15,7 +15,7 @@ const EVEN: f32 = 0.02;
 /// Small samples have, by chance, variances below the noise's. A window is even if its variance is at most this many
 /// standard deviations of a sample's variance above that of the window of half its radius; and the noise's variance is
 /// taken to be as far above the least one of all windows that a pixel can take.
-const CHANCE: f32 = 3.0;
+pub(crate) const CHANCE: f32 = 3.0;
 /// What the part of a window's variance that is not noise counts.
 const MISFIT: f32 = 3.0;
 /// What the squared distance of the points next to the pixel from the window's plane counts, where it is more than
@@ -75,11 +75,6 @@ impl Asked<'_> {
     }
 }
 
-/// What a variance of this many points is multiplied with, to be one that noise may have.
-pub(crate) fn chance(points: f32) -> f32 {
-    1.0 + CHANCE * (2.0 / (points - 3.0)).sqrt()
-}
-
 /// The even windows of all pixels, row by row: the plain form.
 pub(crate) fn even_windows(cloud: &Cloud, asked: &Asked) -> Vec<EvenWindow> {
     let pixels = (0..cloud.height).flat_map(|y| (0..cloud.width).map(move |x| (x, y)));
@@ -99,7 +94,10 @@ fn even_window(cloud: &Cloud, asked: &Asked, pixel: (usize, usize)) -> Option<Ev
     };
     let radii = std::iter::successors(Some(wanted), |radius| Some(radius * 7 / 10));
     let mut radii = radii.take_while(|radius| *radius > clean && *radius >= JAGGED_RADIUS);
-    let noise = |plane: &Plane| plane.unevenness * f64::from(chance(plane.points as f32));
+    let noise = |plane: &Plane| {
+        let chance = (2.0 / (plane.points as f32 - 3.0)).sqrt();
+        plane.unevenness * f64::from(1.0 + CHANCE * chance)
+    };
     let (radius, plane) = radii.find_map(jagged).or_else(|| {
         let mut radius = asked.largest(at).min(clean);
         let mut found = plane(radius)?;

@@ -18,7 +18,7 @@ mod surroundings;
 
 pub(crate) use cloud::{CleanPoints, Cleaned, Cloud};
 pub(crate) use even_windows::{
-    Asked, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, chance, even_windows,
+    Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, even_windows,
 };
 pub(crate) use methods::estimate as plain_estimate;
 pub(crate) use planes::{Plane, inverse_depth};
@@ -27,7 +27,7 @@ pub(crate) use smoothing_area::window;
 
 use creases::SummedNormals;
 use depth_change::DepthChanges;
-use even_windows::EvenWindows;
+use even_windows::{Candidate, EvenWindows};
 
 use crate::Error;
 use crate::cloud::Points;
@@ -126,6 +126,9 @@ fn is_depth_change(depth: f32, difference: f32, gap: usize, options: &Options) -
     }
 }
 
+/// Makes a row's choices.
+pub(crate) type ChooseRow<'a> = dyn Fn(usize, &mut [Choice]) + Sync + 'a;
+
 /// How windows and their estimates are computed: by the plain forms, or fast. Estimates are turned to the viewpoint.
 pub(crate) trait Engine {
     /// Every pixel's window, 0 for none, as a radius, or in PCL's semantics as a side; and its estimate.
@@ -133,6 +136,9 @@ pub(crate) trait Engine {
 
     /// The even windows of all pixels.
     fn even_windows(&mut self, cloud: &Cloud, asked: &Asked) -> Result<Vec<EvenWindow>, Error>;
+
+    /// Calls `choose` with every row, and its number.
+    fn for_each_row(&mut self, choices: &mut [Choice], choose: &ChooseRow) -> Result<(), Error>;
 
     /// The estimates of other windows, for the pixels that have one, by their radii.
     fn of_radii(&mut self, radii: &[u32]) -> Result<Vec<Estimate>, Error>;
@@ -223,10 +229,8 @@ pub(crate) fn estimates(
     let even = EvenWindows { cloud: &cloud, asked: &asked, windows };
     let normals = options.crease_windows.then(|| SummedNormals::new(&estimates, width, height));
 
-    // The pixels that another pixel's window may serve better, and which one; that, or none.
-    let mut moved: Vec<(usize, Option<usize>)> = Vec::new();
-    let mut found = Vec::new();
-    for at in (0..width * height).filter(|at| !cloud.is_missing(*at)) {
+    // Whether another pixel's window may serve a pixel better, and which one.
+    let choice = |at: usize, found: &mut Vec<Candidate>| {
         let is_cut = options.one_sided_windows && sizes[at] < wanted[at];
         let is_near_crease = || {
             sizes[at] > 0
@@ -234,34 +238,43 @@ pub(crate) fn estimates(
                     normals.vary_in(&window_of_size(&cloud, options, at, sizes[at]))
                 })
         };
-        if is_cut || is_near_crease() {
-            let halves = std::iter::successors(Some(asked.largest(at)), |radius| Some(radius / 2));
-            let radii = halves.take_while(|radius| *radius > 0);
-            let levels = if is_cut { usize::MAX } else { CREASE_LEVELS };
-            let tolerance = tolerance(cloud.depths[at], options);
-            let pixel = (at % width, at / width);
-            moved.push((at, even.best(pixel, radii.take(levels), tolerance, &mut found)));
+        if cloud.is_missing(at) || !(is_cut || is_near_crease()) {
+            return Choice::Own;
         }
-    }
+        let halves = std::iter::successors(Some(asked.largest(at)), |radius| Some(radius / 2));
+        let radii = halves.take_while(|radius| *radius > 0);
+        let levels = if is_cut { usize::MAX } else { CREASE_LEVELS };
+        let tolerance = tolerance(cloud.depths[at], options);
+        let pixel = (at % width, at / width);
+        let best = even.best(pixel, radii.take(levels), tolerance, found);
+        best.map_or(Choice::None, Choice::Of)
+    };
+    let mut choices = vec![Choice::Own; width * height];
+    engine.for_each_row(&mut choices, &|y, row| {
+        let mut found = Vec::new();
+        for (x, to) in row.iter_mut().enumerate() {
+            *to = choice(y * width + x, &mut found);
+        }
+    })?;
     let mut radii = vec![0; width * height];
-    for &(_, other) in &moved {
-        if let Some(other) = other {
+    for choice in &choices {
+        if let Choice::Of(other) = *choice {
             radii[other] = even.radius(other);
         }
     }
     let second = engine.of_radii(&radii)?;
-    for (at, other) in moved {
-        let other = other.map_or(Estimate::NONE, |other| second[other]);
-        let found = if !other.normal[0].is_nan() {
-            other
-        } else if options.one_sided_windows && estimates[at].normal[0].is_nan() {
-            let same = |depth: f32, difference: f32, distance: usize| {
-                !is_depth_change(depth, difference, distance.max(1), options)
-            };
-            let pixel = (at % width, at / width);
-            surroundings::plane_around(&cloud, pixel, same).unwrap_or(Estimate::NONE)
-        } else {
-            continue;
+    for (at, choice) in choices.into_iter().enumerate() {
+        let found = match choice {
+            Choice::Own => continue,
+            Choice::Of(other) if !second[other].normal[0].is_nan() => second[other],
+            _ if options.one_sided_windows && estimates[at].normal[0].is_nan() => {
+                let same = |depth: f32, difference: f32, distance: usize| {
+                    !is_depth_change(depth, difference, distance.max(1), options)
+                };
+                let pixel = (at % width, at / width);
+                surroundings::plane_around(&cloud, pixel, same).unwrap_or(Estimate::NONE)
+            }
+            _ => continue,
         };
         let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
         estimates[at] = Estimate { normal, ..found };
@@ -270,6 +283,17 @@ pub(crate) fn estimates(
         estimates.iter_mut().for_each(|estimate| estimate.curvature = f32::NAN);
     }
     Ok(estimates)
+}
+
+/// Whose window a pixel takes.
+#[derive(Clone, Copy)]
+pub(crate) enum Choice {
+    /// Its own, which the first pass has looked at.
+    Own,
+    /// Another one's, but there is none.
+    None,
+    /// That of a pixel, its even window.
+    Of(usize),
 }
 
 /// A crease does not bound the windows next to it as a depth change does: of the sizes that are tried, these many.

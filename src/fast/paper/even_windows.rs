@@ -9,7 +9,7 @@ use super::rects::{Place, Rects};
 use crate::fast::Parts;
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::fast::tile::Bits;
-use crate::paper::{Asked, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, Plane, chance};
+use crate::paper::{Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, Plane};
 use crate::paper::{inverse_depth, window};
 use crate::simd::{GROUP, Simd};
 
@@ -249,12 +249,9 @@ impl EvenTile<'_> {
             let slope = [(xr * yy - yr * xy) / determinant, (yr * xx - xr * xy) / determinant];
             let deviation = rr - slope[0] * xr - slope[1] * yr;
             let unevenness = deviation.max(Doubles::splat(0.0)) / (n - Doubles::splat(3.0));
-            let (mut points, mut chances) = ([0.0; GROUP], [0.0; GROUP]);
-            S::store(points.as_mut_ptr(), n.narrow().0);
-            for lane in 0..GROUP {
-                chances[lane] = chance(points[lane]);
-            }
-            let noise = unevenness * Floats::<S>(S::load(chances.as_ptr())).widen();
+            let chance = Floats::splat(2.0) / (n.narrow() - Floats::splat(3.0));
+            let chance = Floats::splat(1.0) + Floats::splat(CHANCE) * chance.sqrt();
+            let noise = unevenness * chance.widen();
             // The pixels' own positions.
             let mut columns = [0.0; GROUP];
             for (lane, column) in columns.iter_mut().enumerate() {
