@@ -3,8 +3,8 @@
 mod clouds;
 
 use clouds::{
-    Cloud, Kind, angle, assert_same_bits, compute, fast_isas, methods, normal, options,
-    paper_options,
+    Cloud, Kind, angle, assert_same_bits, compute, edge_options, fast_isas, methods, normal,
+    options, paper_options,
 };
 use iine::{Estimator, Isa, Method, Normals, Options, Points, Semantics};
 
@@ -166,6 +166,24 @@ fn the_papers_largest_windows_equal_the_plain_form() {
             worst.check(&cloud, &format!("{kind:?}"), &options);
         }
     }
+    println!("{worst:?}");
+}
+
+#[test]
+fn windows_near_depth_changes_and_creases_equal_the_plain_form() {
+    let mut worst = Worst::default();
+    for (seed, kind) in (0..).zip(Kind::ALL) {
+        let cloud = Cloud::new(kind, 93, 71, seed);
+        for options in edge_options() {
+            worst.check(&cloud, &format!("{kind:?}"), &options);
+        }
+    }
+    let cloud = Cloud::new(Kind::NanBlocks, 640, 300, 3);
+    let mut options = Options::default();
+    options.semantics = Semantics::Paper;
+    options.one_sided_windows = true;
+    options.crease_windows = true;
+    worst.check(&cloud, "several tiles", &options);
     println!("{worst:?}");
 }
 

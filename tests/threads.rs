@@ -7,7 +7,8 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
 use clouds::{
-    Cloud, Kind, Random, assert_same_bits, compute, fast_isas, methods, options, paper_options,
+    Cloud, Kind, Random, assert_same_bits, compute, edge_options, fast_isas, methods, options,
+    paper_options,
 };
 use iine::{BorderPolicy, Estimator, Isa, Method, Normals};
 
@@ -46,6 +47,7 @@ fn the_number_of_threads_does_not_matter() {
     ] {
         let cloud = Cloud::new(kind, width, height, 11);
         let mut all = paper_options();
+        all.extend(edge_options());
         for method in methods() {
             for depth_dependent in [false, true] {
                 all.extend([5.0, 10.0, 20.0].map(|size| options(method, size, depth_dependent)));
@@ -116,7 +118,7 @@ fn listed_pixels_get_what_the_whole_cloud_gives_them() {
 fn frames_before_do_not_matter() {
     let mut random = Random::new(14);
     let combinations: Vec<_> = methods().collect();
-    let papers = paper_options();
+    let papers = [paper_options(), edge_options()].concat();
     let mut reused = Estimator::new(options(combinations[0], 10.0, false));
     for seed in 0..150 {
         let (width, height) = (1 + random.below(300), 1 + random.below(120));

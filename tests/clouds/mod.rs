@@ -259,6 +259,22 @@ pub fn paper_options() -> Vec<Options> {
     all
 }
 
+/// Windows near depth changes and creases, on both semantics.
+pub fn edge_options() -> Vec<Options> {
+    let mut all = Vec::new();
+    for semantics in [Semantics::Paper, Semantics::Pcl] {
+        for [one_sided, crease] in [[true, false], [false, true], [true, true]] {
+            let mut options = Options::default();
+            options.semantics = semantics;
+            options.method = Method::CovarianceMatrix;
+            options.one_sided_windows = one_sided;
+            options.crease_windows = crease;
+            all.push(options);
+        }
+    }
+    all
+}
+
 /// nx, ny, nz, curvature of every pixel.
 pub fn compute(estimator: &mut Estimator, cloud: &Cloud) -> Vec<[f32; 4]> {
     let mut found = vec![[7.0; 4]; cloud.width * cloud.height];
