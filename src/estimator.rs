@@ -394,7 +394,7 @@ impl paper::Engine for Engine<'_> {
     }
 
     fn of_radii(&mut self, radii: &[u32]) -> Result<Vec<Estimate>, Error> {
-        if self.options.semantics == Semantics::Pcl || self.is_plain {
+        if self.is_plain {
             let width = self.points.width();
             return Ok(self.plain(|(x, y)| {
                 let radius = radii[y * width + x] as usize;

@@ -191,16 +191,16 @@ pub struct Options {
     pub threads: usize,
     /// Whose windows and sums; default [`Semantics::Pcl`].
     pub semantics: Semantics,
-    /// The parameters of [`Semantics::Paper`] and of `crease_windows`.
+    /// The parameters of [`Semantics::Paper`], of `one_sided_windows` and of `crease_windows`.
     pub paper: PaperOptions,
     /// Takes points at (0, 0, 0) as missing, as LiDARs and some depth cameras write them; default off.
     pub zero_is_missing: bool,
     /// Gives pixels near a depth change a window of their own side, and with it a normal to every pixel that has
-    /// two neighbours on its surface not in line with it; default off.
+    /// two neighbours on its surface not in line with it; default off. Takes the sensor's [`PaperOptions::alpha`] and
+    /// [`PaperOptions::largest_radius`] in either semantics.
     pub one_sided_windows: bool,
     /// In a second pass moves windows off the places where the normals of the first vary strongly, so that edges
-    /// without a depth change stay sharp; default off. Takes the sensor's [`PaperOptions::alpha`] in either
-    /// semantics.
+    /// without a depth change stay sharp; default off. Takes the same two parameters in either semantics.
     pub crease_windows: bool,
 }
 
@@ -232,8 +232,8 @@ impl Options {
             }
             return self.paper.check();
         }
-        if self.crease_windows {
-            // They ask for alpha.
+        if self.one_sided_windows || self.crease_windows {
+            // They ask for alpha and the largest radius.
             self.paper.check()?;
         }
         if !(self.normal_smoothing_size.is_finite() && self.normal_smoothing_size > 0.0) {

@@ -236,9 +236,10 @@ fn parameters_that_are_none_are_refused() {
     };
     let mut paper = Options::default();
     paper.semantics = Semantics::Paper;
-    let mut creases = Options::default();
+    let [mut one_sided, mut creases] = [Options::default(), Options::default()];
+    one_sided.one_sided_windows = true;
     creases.crease_windows = true;
-    for options in [paper.clone(), creases] {
+    for options in [paper.clone(), one_sided, creases] {
         assert!(!refused(options.clone()));
         for change in changes {
             for value in [0.0, -0.0, -3.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {

@@ -158,6 +158,17 @@
 #define IINE_VERSION_PATCH 0
 
 /**
+ * The fewest points that tell how well a plane fits.
+ */
+#define Plane_FEWEST 6.0
+
+/**
+ * Points are on one line of the image if the determinant of their positions' scatter is at most this share of
+ * the product of its diagonal: rounding.
+ */
+#define Plane_LINE 1e-6
+
+/**
  * Estimates normals. Owns its options and its scratch memory, which is reused from frame to frame.
  *
  * One estimator is used by one thread at a time; different estimators freely.
@@ -519,7 +530,7 @@ int32_t iine_estimator_set_semantics(struct iine_estimator *estimator,
  * Sets alpha: the smallest depth change that the sensor can tell at depth d is alpha d^2 (Eq. 4). In 1/unit of
  * length; finite, above 0; default 0.0028, the paper's for a Kinect and metres. See `iine_alpha_of_sensor`.
  *
- * Used by IINE_SEMANTICS_PAPER and by crease windows.
+ * Used by IINE_SEMANTICS_PAPER, and by one-sided and crease windows.
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
  *
@@ -601,7 +612,9 @@ int32_t iine_estimator_set_zero_is_missing(struct iine_estimator *estimator, int
 
 /**
  * Whether pixels near a depth change get a window of their own side, and with it a normal every pixel that has
- * two neighbours on its surface not in line with it: 0 (the default) or 1. With either semantics.
+ * two neighbours on its surface not in line with it: 0 (the default) or 1. With either semantics; takes the sensor's
+ * alpha from `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of
+ * `iine_estimator_set_paper_radii`.
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
  *
@@ -614,7 +627,7 @@ int32_t iine_estimator_set_one_sided_windows(struct iine_estimator *estimator,
 /**
  * Whether a second pass moves windows off the places where the normals of the first vary strongly, so that edges
  * without a depth change stay sharp: 0 (the default) or 1. With either semantics; takes the sensor's alpha from
- * `iine_estimator_set_paper_alpha`.
+ * `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of `iine_estimator_set_paper_radii`.
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
  *

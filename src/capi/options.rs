@@ -218,7 +218,7 @@ pub unsafe extern "C" fn iine_estimator_set_semantics(
 /// Sets alpha: the smallest depth change that the sensor can tell at depth d is alpha d^2 (Eq. 4). In 1/unit of
 /// length; finite, above 0; default 0.0028, the paper's for a Kinect and metres. See `iine_alpha_of_sensor`.
 ///
-/// Used by IINE_SEMANTICS_PAPER and by crease windows.
+/// Used by IINE_SEMANTICS_PAPER, and by one-sided and crease windows.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
 ///
@@ -364,7 +364,9 @@ pub unsafe extern "C" fn iine_estimator_set_zero_is_missing(
 }
 
 /// Whether pixels near a depth change get a window of their own side, and with it a normal every pixel that has
-/// two neighbours on its surface not in line with it: 0 (the default) or 1. With either semantics.
+/// two neighbours on its surface not in line with it: 0 (the default) or 1. With either semantics; takes the sensor's
+/// alpha from `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of
+/// `iine_estimator_set_paper_radii`.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
 ///
@@ -385,7 +387,7 @@ pub unsafe extern "C" fn iine_estimator_set_one_sided_windows(
 
 /// Whether a second pass moves windows off the places where the normals of the first vary strongly, so that edges
 /// without a depth change stay sharp: 0 (the default) or 1. With either semantics; takes the sensor's alpha from
-/// `iine_estimator_set_paper_alpha`.
+/// `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of `iine_estimator_set_paper_radii`.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
 ///

@@ -6,13 +6,12 @@ use crate::eigen::{Symmetric3, eigen};
 use crate::methods::{Estimate, normal_of_tangents};
 use crate::options::Method;
 
-/// The estimate of a method of the paper.
+/// The estimate of a method of the paper; of SIMPLE_3D_GRADIENT, which it does not have, by the 3-D gradient.
 pub(crate) fn estimate(method: Method, cloud: &impl CleanPoints, rect: &Rect) -> Estimate {
     match method {
         Method::AverageDepthChange => smoothed_depth_changes(cloud, rect),
-        Method::Average3DGradient => gradients(cloud, rect),
+        Method::Average3DGradient | Method::Simple3DGradient => gradients(cloud, rect),
         Method::CovarianceMatrix => plane_of(|| cloud.finite(rect)).unwrap_or(Estimate::NONE),
-        Method::Simple3DGradient => Estimate::NONE,
     }
 }
 

@@ -31,10 +31,9 @@ use even_windows::{Candidate, EvenWindows};
 
 use crate::Error;
 use crate::cloud::Points;
-use crate::methods::{self as pcl, Estimate};
-use crate::options::{BorderPolicy, Method, Options, Semantics};
+use crate::methods::Estimate;
+use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
-use crate::window::Image;
 
 /// The maps of [`Semantics::Paper`], row by row.
 pub(crate) struct PaperMaps {
@@ -188,17 +187,9 @@ pub(crate) fn of_radius(
     pixel: (usize, usize),
     radius: usize,
 ) -> Estimate {
-    let (width, height) = (points.width(), points.height());
-    match options.semantics {
-        Semantics::Paper => {
-            let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
-            methods::estimate(options.method, &cleaned, &window(pixel, radius, width, height))
-        }
-        Semantics::Pcl => {
-            let image = Image { width, height, border_policy: BorderPolicy::Ignore };
-            pcl::estimate(options.method, points, &image, pixel, 2 * radius + 1)
-        }
-    }
+    let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
+    let rect = window(pixel, radius, points.width(), points.height());
+    methods::estimate(options.method, &cleaned, &rect)
 }
 
 /// The estimates of all pixels, row by row, turned to the viewpoint: near depth changes and near creases from the

@@ -454,7 +454,8 @@ namespace iine
       }
 
       /** \brief Set whether pixels near a depth change get a window of their own side, and with it a normal every pixel
-        * that has two neighbours on its surface not in line with it. With either semantics. Not in PCL's class.
+        * that has two neighbours on its surface not in line with it. With either semantics, and the alpha of
+        * \ref setPaperAlpha and the largest radius of \ref setPaperRadii. Not in PCL's class.
         * \param[in] one_sided_windows whether they do; default false
         */
       void
@@ -464,8 +465,8 @@ namespace iine
       }
 
       /** \brief Set whether a second pass moves windows off the places where the normals of the first vary strongly, so
-        * that edges without a depth change stay sharp. With either semantics, and the alpha of \ref setPaperAlpha. Not
-        * in PCL's class.
+        * that edges without a depth change stay sharp. With either semantics, and the alpha of \ref setPaperAlpha and
+        * the largest radius of \ref setPaperRadii. Not in PCL's class.
         * \param[in] crease_windows whether it does; default false
         */
       void

@@ -373,7 +373,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Task for TileTask<'a, '_, F> {
                     let integrals = &mut scratch.depth_changes;
                     tile.compute::<S, _, 4>(&SmoothedDepthChanges, integrals, sink);
                 }
-                // The paper has no SIMPLE_3D_GRADIENT; the options' check refuses it.
+                // The paper has no SIMPLE_3D_GRADIENT: second passes on PCL's semantics take this instead.
                 Method::Average3DGradient | Method::Simple3DGradient => {
                     tile.compute::<S, _, 8>(&Gradients, &mut scratch.gradients, sink);
                 }
