@@ -9,9 +9,7 @@ use crate::isa::Isa;
 use crate::methods::{Estimate, covariance_matrix, estimate, estimate_window};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
-use crate::paper::{
-    self, Asked, Choice, ChooseRow, Cloud, EvenWindow, PaperMaps, with_missing_as_nan,
-};
+use crate::paper::{self, Asked, ChooseRow, Cloud, EvenWindow, PaperMaps, with_missing_as_nan};
 use crate::smoothing_area::window_side;
 use crate::window::Image;
 
@@ -384,7 +382,11 @@ impl paper::Engine for Engine<'_> {
         fast::paper::even_windows(self.isa, cloud, asked, self.options.threads, self.scratch)
     }
 
-    fn for_each_row(&mut self, choices: &mut [Choice], choose: &ChooseRow) -> Result<(), Error> {
+    fn for_each_row(
+        &mut self,
+        choices: &mut [Option<usize>],
+        choose: &ChooseRow,
+    ) -> Result<(), Error> {
         let width = self.points.width();
         if self.is_plain {
             choices.chunks_mut(width).enumerate().for_each(|(y, row)| choose(y, row));

@@ -54,6 +54,8 @@ pub(crate) struct EvenWindow {
 pub(crate) struct Asked<'a> {
     /// The radius that the depth asks for, at most `limit`; 0 at a missing point.
     pub wanted: &'a [u32],
+    /// Whether some pixel may take the window.
+    pub needed: &'a [bool],
     /// The largest radius of a window without a depth change.
     pub clean: &'a [u32],
     /// The largest radius of all.
@@ -63,10 +65,9 @@ pub(crate) struct Asked<'a> {
 }
 
 impl Asked<'_> {
-    /// The largest radius that a pixel's window may have: twice the wanted one, since whether a pixel is on one side
-    /// of a crease or on the other is told from less noise then.
+    /// The largest radius that a pixel's window may have.
     pub fn largest(&self, at: usize) -> u32 {
-        (2 * self.wanted[at]).min(self.limit)
+        largest_radius(self.wanted[at], self.limit)
     }
 
     /// The variance told from none where the sensor's smallest depth change is `alpha`.
@@ -75,7 +76,13 @@ impl Asked<'_> {
     }
 }
 
-/// The even windows of all pixels, row by row: the plain form.
+/// The largest radius of an even window where the depth asks for another one: twice that, since whether a pixel is on
+/// one side of a crease or on the other is told from less noise then.
+pub(crate) fn largest_radius(wanted: u32, limit: u32) -> u32 {
+    (2 * wanted).min(limit)
+}
+
+/// The even windows of the needed pixels, row by row: the plain form.
 pub(crate) fn even_windows(cloud: &Cloud, asked: &Asked) -> Vec<EvenWindow> {
     let pixels = (0..cloud.height).flat_map(|y| (0..cloud.width).map(move |x| (x, y)));
     pixels.map(|pixel| even_window(cloud, asked, pixel).unwrap_or_default()).collect()
@@ -83,6 +90,9 @@ pub(crate) fn even_windows(cloud: &Cloud, asked: &Asked) -> Vec<EvenWindow> {
 
 fn even_window(cloud: &Cloud, asked: &Asked, pixel: (usize, usize)) -> Option<EvenWindow> {
     let at = cloud.index(pixel.0, pixel.1);
+    if !asked.needed[at] {
+        return None;
+    }
     let (wanted, clean) = (asked.wanted[at], asked.clean[at]);
     let rect = |radius: u32| Rect::around(pixel, radius as usize, (cloud.width, cloud.height));
     let plane = |radius: u32| Plane::of(cloud, &rect(radius));
@@ -155,7 +165,9 @@ impl EvenWindows<'_> {
         let cloud = self.cloud;
         let mut noise = f32::INFINITY;
         found.clear();
-        let mut add = |at: usize, dx: isize, dy: isize| {
+        let own = cloud.index(pixel.0, pixel.1);
+        for_each_place(pixel, (cloud.width, cloud.height), radii, |dx, dy| {
+            let at = own.wrapping_add_signed(dy * cloud.width as isize + dx);
             let window = &self.windows[at];
             let distance = dx.unsigned_abs().max(dy.unsigned_abs()) as u32;
             if window.radius > 0 && distance <= window.radius + REACH {
@@ -163,23 +175,7 @@ impl EvenWindows<'_> {
                 let short = distance.saturating_sub(window.radius);
                 found.push(Candidate { at, to_pixel: [-dx as f32, -dy as f32], short });
             }
-        };
-        let own = cloud.index(pixel.0, pixel.1);
-        add(own, 0, 0);
-        let step = |from: usize, step: isize, size: usize| {
-            from.saturating_add_signed(step).min(size - 1) as isize - from as isize
-        };
-        for radius in radii {
-            let radius = radius as isize;
-            let [left, right] = [-radius, radius].map(|by| step(pixel.0, by, cloud.width));
-            let [up, down] = [-radius, radius].map(|by| step(pixel.1, by, cloud.height));
-            // Of windows that are worth the same, the one at the middle of an edge is nearer.
-            let edges = [(left, 0), (right, 0), (0, up), (0, down)];
-            let corners = [(left, up), (right, up), (left, down), (right, down)];
-            for (dx, dy) in edges.into_iter().chain(corners) {
-                add(own.wrapping_add_signed(dy * cloud.width as isize + dx), dx, dy);
-            }
-        }
+        });
 
         let noise = noise.max(self.asked.least_noise);
         let near = self.near(pixel);
@@ -200,7 +196,8 @@ impl EvenWindows<'_> {
             let misfit = (window.unevenness - noise).max(0.0);
             let bend = MISFIT * misfit + NEAR * astray;
             let cost = (noise * window.per_noise + bend * window.per_bend) * far;
-            let steepness = || window.slope[0].hypot(window.slope[1]);
+            let [across, down] = window.slope;
+            let steepness = || (across * across + down * down).sqrt();
             let lies_in = || (point - at_pixel(0.0, 0.0)).abs() <= tolerance + JITTER * steepness();
             if cost < least && (short == 0 || lies_in()) {
                 best = Some((cost, at));
@@ -226,6 +223,34 @@ impl EvenWindows<'_> {
         }
         let [inverse_depth, dx, dy] = sums.map(|sum| sum / points);
         Near { inverse_depth, offset: [dx, dy], points }
+    }
+}
+
+/// Calls `visit` with the ways in columns and rows from a pixel to those whose windows it can take: itself, and those at
+/// the places of windows of these radii.
+#[inline(always)]
+pub(crate) fn for_each_place(
+    (x, y): (usize, usize),
+    (width, height): (usize, usize),
+    radii: impl Iterator<Item = u32>,
+    mut visit: impl FnMut(isize, isize),
+) {
+    let step = |from: usize, step: isize, size: usize| {
+        from.saturating_add_signed(step).min(size - 1) as isize - from as isize
+    };
+    visit(0, 0);
+    for radius in radii {
+        let radius = radius as isize;
+        let (left, right) = (step(x, -radius, width), step(x, radius, width));
+        let (up, down) = (step(y, -radius, height), step(y, radius, height));
+        // Of windows that are worth the same, the one at the middle of an edge is nearer.
+        let edges = [(left, 0), (right, 0), (0, up), (0, down)];
+        let corners = [(left, up), (right, up), (left, down), (right, down)];
+        for places in [edges, corners] {
+            for (dx, dy) in places {
+                visit(dx, dy);
+            }
+        }
     }
 }
 

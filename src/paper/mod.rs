@@ -27,7 +27,7 @@ pub(crate) use smoothing_area::window;
 
 use creases::SummedNormals;
 use depth_change::DepthChanges;
-use even_windows::{Candidate, EvenWindows};
+use even_windows::{EvenWindows, for_each_place};
 
 use crate::Error;
 use crate::cloud::Points;
@@ -125,19 +125,23 @@ fn is_depth_change(depth: f32, difference: f32, gap: usize, options: &Options) -
     }
 }
 
-/// Makes a row's choices.
-pub(crate) type ChooseRow<'a> = dyn Fn(usize, &mut [Choice]) + Sync + 'a;
+/// Chooses for every pixel of a row another one, or none.
+pub(crate) type ChooseRow<'a> = dyn Fn(usize, &mut [Option<usize>]) + Sync + 'a;
 
 /// How windows and their estimates are computed: by the plain forms, or fast. Estimates are turned to the viewpoint.
 pub(crate) trait Engine {
     /// Every pixel's window, 0 for none, as a radius, or in PCL's semantics as a side; and its estimate.
     fn windows(&mut self) -> Result<(Vec<u32>, Vec<Estimate>), Error>;
 
-    /// The even windows of all pixels.
+    /// The even windows of the needed pixels.
     fn even_windows(&mut self, cloud: &Cloud, asked: &Asked) -> Result<Vec<EvenWindow>, Error>;
 
     /// Calls `choose` with every row, and its number.
-    fn for_each_row(&mut self, choices: &mut [Choice], choose: &ChooseRow) -> Result<(), Error>;
+    fn for_each_row(
+        &mut self,
+        choices: &mut [Option<usize>],
+        choose: &ChooseRow,
+    ) -> Result<(), Error>;
 
     /// The estimates of other windows, for the pixels that have one, by their radii.
     fn of_radii(&mut self, radii: &[u32]) -> Result<Vec<Estimate>, Error>;
@@ -205,70 +209,81 @@ pub(crate) fn estimates(
     }
     let cloud = Cloud::new(points, options);
     let (width, height) = (cloud.width, cloud.height);
+    let pixels = || (0..width * height).map(|at| (at, (at % width, at / width)));
     let wanted: Vec<u32> = (0..width * height).map(|at| wanted_size(&cloud, options, at)).collect();
     let clean = depth_changes(&cloud, options).not_explained(&cloud).clean_radii();
     let limit = options.paper.largest_radius;
     let radius = |size: &u32| radius_of_size(*size, options).min(limit);
     let wanted_radii: Vec<u32> = wanted.iter().map(radius).collect();
-    let asked = Asked {
-        wanted: &wanted_radii,
-        clean: &clean,
-        limit,
-        least_noise: Asked::least_noise(options.paper.alpha),
-    };
-    let windows = engine.even_windows(&cloud, &asked)?;
-    let even = EvenWindows { cloud: &cloud, asked: &asked, windows };
     let normals = options.crease_windows.then(|| SummedNormals::new(&estimates, width, height));
-
-    // Whether another pixel's window may serve a pixel better, and which one.
-    let choice = |at: usize, found: &mut Vec<Candidate>| {
-        let is_cut = options.one_sided_windows && sizes[at] < wanted[at];
+    // Of how many radii a pixel tries other pixels' windows: none unless one may serve it better than its own.
+    let levels = |at: usize| {
         let is_near_crease = || {
             sizes[at] > 0
                 && normals.as_ref().is_some_and(|normals| {
                     normals.vary_in(&window_of_size(&cloud, options, at, sizes[at]))
                 })
         };
-        if cloud.is_missing(at) || !(is_cut || is_near_crease()) {
-            return Choice::Own;
+        if options.one_sided_windows && sizes[at] < wanted[at] {
+            u32::BITS as u8
+        } else if !cloud.is_missing(at) && is_near_crease() {
+            CREASE_LEVELS
+        } else {
+            0
         }
-        let halves = std::iter::successors(Some(asked.largest(at)), |radius| Some(radius / 2));
-        let radii = halves.take_while(|radius| *radius > 0);
-        let levels = if is_cut { usize::MAX } else { CREASE_LEVELS };
-        let tolerance = tolerance(cloud.depths[at], options);
-        let pixel = (at % width, at / width);
-        let best = even.best(pixel, radii.take(levels), tolerance, found);
-        best.map_or(Choice::None, Choice::Of)
     };
-    let mut choices = vec![Choice::Own; width * height];
+    let levels: Vec<u8> = (0..width * height).map(levels).collect();
+    let radii = |at: usize| {
+        let largest = even_windows::largest_radius(wanted_radii[at], limit);
+        (0..u32::from(levels[at])).map(move |level| largest >> level).take_while(|r| *r > 0)
+    };
+    let concerned = || pixels().filter(|(at, _)| levels[*at] > 0);
+    let mut needed = vec![false; width * height];
+    for (at, pixel) in concerned() {
+        for_each_place(pixel, (width, height), radii(at), |dx, dy| {
+            needed[at.wrapping_add_signed(dy * width as isize + dx)] = true;
+        });
+    }
+    let asked = Asked {
+        wanted: &wanted_radii,
+        needed: &needed,
+        clean: &clean,
+        limit,
+        least_noise: Asked::least_noise(options.paper.alpha),
+    };
+    let windows = engine.even_windows(&cloud, &asked)?;
+    let even = EvenWindows { cloud: &cloud, asked: &asked, windows };
+    // The pixel whose window a pixel takes, if there is one.
+    let mut choices = vec![None; width * height];
     engine.for_each_row(&mut choices, &|y, row| {
         let mut found = Vec::new();
         for (x, to) in row.iter_mut().enumerate() {
-            *to = choice(y * width + x, &mut found);
+            let at = y * width + x;
+            if levels[at] > 0 {
+                let tolerance = tolerance(cloud.depths[at], options);
+                *to = even.best((x, y), radii(at), tolerance, &mut found);
+            }
         }
     })?;
-    let mut radii = vec![0; width * height];
-    for choice in &choices {
-        if let Choice::Of(other) = *choice {
-            radii[other] = even.radius(other);
-        }
+    let mut taken = vec![0; width * height];
+    for other in choices.iter().flatten() {
+        taken[*other] = even.radius(*other);
     }
-    let second = engine.of_radii(&radii)?;
-    for (at, choice) in choices.into_iter().enumerate() {
-        let found = match choice {
-            Choice::Own => continue,
-            Choice::Of(other) if !second[other].normal[0].is_nan() => second[other],
-            _ if options.one_sided_windows && estimates[at].normal[0].is_nan() => {
-                let same = |depth: f32, difference: f32, distance: usize| {
-                    !is_depth_change(depth, difference, distance.max(1), options)
-                };
-                let pixel = (at % width, at / width);
-                surroundings::plane_around(&cloud, pixel, same).unwrap_or(Estimate::NONE)
-            }
-            _ => continue,
+    let second = engine.of_radii(&taken)?;
+    for (at, pixel) in concerned() {
+        let found =
+            choices[at].map(|other| second[other]).filter(|found| !found.normal[0].is_nan());
+        let around = || {
+            let same = |depth: f32, difference: f32, distance: usize| {
+                !is_depth_change(depth, difference, distance.max(1), options)
+            };
+            let has_none = options.one_sided_windows && estimates[at].normal[0].is_nan();
+            has_none.then(|| surroundings::plane_around(&cloud, pixel, same)).flatten()
         };
-        let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
-        estimates[at] = Estimate { normal, ..found };
+        if let Some(found) = found.or_else(around) {
+            let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
+            estimates[at] = Estimate { normal, ..found };
+        }
     }
     if options.method != Method::CovarianceMatrix {
         estimates.iter_mut().for_each(|estimate| estimate.curvature = f32::NAN);
@@ -276,19 +291,8 @@ pub(crate) fn estimates(
     Ok(estimates)
 }
 
-/// Whose window a pixel takes.
-#[derive(Clone, Copy)]
-pub(crate) enum Choice {
-    /// Its own, which the first pass has looked at.
-    Own,
-    /// Another one's, but there is none.
-    None,
-    /// That of a pixel, its even window.
-    Of(usize),
-}
-
 /// A crease does not bound the windows next to it as a depth change does: of the sizes that are tried, these many.
-const CREASE_LEVELS: usize = 2;
+const CREASE_LEVELS: u8 = 2;
 
 /// How far from a plane a point at a depth may lie to be on that surface, in inverse depth: half a depth change.
 fn tolerance(depth: f32, options: &Options) -> f32 {

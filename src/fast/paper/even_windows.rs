@@ -9,8 +9,9 @@ use super::rects::{Place, Rects};
 use crate::fast::Parts;
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::fast::tile::Bits;
-use crate::paper::{Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, Plane};
-use crate::paper::{inverse_depth, window};
+use crate::paper::{
+    Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, Plane, inverse_depth, window,
+};
 use crate::simd::{GROUP, Simd};
 
 /// A rectangle of the image whose even windows are found together.
@@ -159,6 +160,9 @@ impl EvenTile<'_> {
         let first = pixel.1 * self.width + pixel.0;
         let (mut wanted, mut clean, mut largest) = ([0; GROUP], [0; GROUP], [0; GROUP]);
         for lane in 0..count {
+            if !self.asked.needed[first + lane] {
+                continue;
+            }
             wanted[lane] = self.asked.wanted[first + lane];
             clean[lane] = self.asked.clean[first + lane];
             largest[lane] = self.asked.largest(first + lane).min(clean[lane]);
