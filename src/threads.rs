@@ -1,11 +1,12 @@
 //! Work shared out among threads. Items are fixed by the frame, not by the number of threads, so results are too.
 
-use rayon::iter::{IndexedParallelIterator, IntoParallelIterator, ParallelIterator};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::Error;
 
-/// The calling thread alone, or a pool of threads of its own that lives until another number is asked for.
+/// The calling thread, and a pool of further threads that lives until another number is asked for.
 #[derive(Debug, Default)]
 pub(crate) struct Workers {
     pool: Option<ThreadPool>,
@@ -21,25 +22,36 @@ impl Workers {
         if threads == 1 {
             self.pool = None;
         } else if self.count() != threads {
-            let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+            let pool = ThreadPoolBuilder::new().num_threads(threads - 1).build();
             self.pool = Some(pool.map_err(|_| Error::Threads)?);
         }
         Ok(())
     }
 
     pub fn count(&self) -> usize {
-        self.pool.as_ref().map_or(1, ThreadPool::current_num_threads)
+        1 + self.pool.as_ref().map_or(0, ThreadPool::current_num_threads)
     }
 
     /// Calls `work(worker, item)` for every item; no two calls run at once with the same worker.
     pub fn for_each(&self, items: usize, work: impl Fn(usize, usize) + Sync) {
-        match &self.pool {
-            None => (0..items).for_each(|item| work(0, item)),
-            Some(pool) => pool.install(|| {
-                (0..items).into_par_iter().with_max_len(1).for_each(|item| {
-                    work(rayon::current_thread_index().unwrap_or(0), item);
-                });
-            }),
-        }
+        let Some(pool) = &self.pool else { return (0..items).for_each(|item| work(0, item)) };
+        let next = AtomicUsize::new(0);
+        let run = |worker: usize| {
+            loop {
+                let item = next.fetch_add(1, Ordering::Relaxed);
+                if item >= items {
+                    break;
+                }
+                work(worker, item);
+            }
+        };
+        // The calling thread works too: schedulers tend to wake others on the core of one that goes to sleep.
+        pool.in_place_scope(|scope| {
+            let run = &run;
+            for worker in 1..self.count() {
+                scope.spawn(move |_| run(worker));
+            }
+            run(0);
+        });
     }
 }
