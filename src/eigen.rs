@@ -22,9 +22,21 @@ impl Symmetric3 {
         self.zz += v[2] * v[2];
     }
 
-    /// The covariance matrix of points times their number, in two passes about their mean; and their number. None
-    /// without points.
-    pub fn scatter<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> Option<(Self, f64)> {
+    pub fn trace(&self) -> f64 {
+        self.xx + self.yy + self.zz
+    }
+}
+
+/// Points' covariance matrix times their number, about their mean.
+pub(crate) struct Scatter {
+    pub matrix: Symmetric3,
+    pub mean: [f64; 3],
+    pub count: f64,
+}
+
+impl Scatter {
+    /// In two passes over the points. None without points.
+    pub fn of<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> Option<Self> {
         let (mut mean, mut count) = ([0.0; 3], 0.0);
         for point in points() {
             for i in 0..3 {
@@ -36,15 +48,16 @@ impl Symmetric3 {
             return None;
         }
         mean = mean.map(|sum| sum / count);
-        let mut scatter = Self::default();
+        let mut matrix = Symmetric3::default();
         for point in points() {
-            scatter.add_outer([point[0] - mean[0], point[1] - mean[1], point[2] - mean[2]]);
+            matrix.add_outer([point[0] - mean[0], point[1] - mean[1], point[2] - mean[2]]);
         }
-        Some((scatter, count))
+        Some(Scatter { matrix, mean, count })
     }
 
-    pub fn trace(&self) -> f64 {
-        self.xx + self.yy + self.zz
+    /// The eigenvalues of the covariance matrix, ascending.
+    pub fn eigenvalues(&self) -> [f64; 3] {
+        eigen(&self.matrix).0.map(|value| value / self.count)
     }
 }
 

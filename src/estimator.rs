@@ -361,10 +361,7 @@ impl paper::Engine for Engine<'_> {
             let maps = PaperMaps::new(self.points, self.options);
             let radii: Vec<u32> =
                 maps.smoothing_radii.iter().map(|radius| *radius as u32).collect();
-            let estimates = self.plain(|(x, y)| {
-                let radius = radii[y * width + x] as usize;
-                (radius > 0).then(|| paper::of_radius(self.points, self.options, (x, y), radius))
-            });
+            let estimates = self.of_radii(&radii)?;
             return Ok((radii, estimates));
         }
         let mut radii = Vec::new();

@@ -75,6 +75,15 @@ impl Worst {
             }
         }
     }
+
+    fn check_every_kind(&mut self, width: usize, height: usize, settings: &[Options]) {
+        for (seed, kind) in (0..).zip(Kind::ALL) {
+            let cloud = Cloud::new(kind, width, height, seed);
+            for options in settings {
+                self.check(&cloud, &format!("{kind:?}"), options);
+            }
+        }
+    }
 }
 
 #[test]
@@ -108,17 +117,13 @@ fn all_sizes_equal_the_plain_form() {
 #[test]
 fn every_kind_equals_the_plain_form() {
     let mut worst = Worst::default();
-    for (seed, kind) in (0..).zip(Kind::ALL) {
-        let cloud = Cloud::new(kind, 77, 53, seed);
-        for method in methods() {
-            for smoothing in SMOOTHING {
-                for depth_dependent in [false, true] {
-                    let options = options(method, smoothing, depth_dependent);
-                    worst.check(&cloud, &format!("{kind:?}"), &options);
-                }
-            }
+    let mut all = Vec::new();
+    for method in methods() {
+        for smoothing in SMOOTHING {
+            all.extend([false, true].map(|dependent| options(method, smoothing, dependent)));
         }
     }
+    worst.check_every_kind(77, 53, &all);
     println!("{worst:?}");
 }
 
@@ -138,12 +143,7 @@ fn the_papers_windows_equal_the_plain_form() {
             }
         }
     }
-    for (seed, kind) in (0..).zip(Kind::ALL) {
-        let cloud = Cloud::new(kind, 77, 53, seed);
-        for options in paper_options() {
-            worst.check(&cloud, &format!("{kind:?}"), &options);
-        }
-    }
+    worst.check_every_kind(77, 53, &paper_options());
     let cloud = Cloud::new(Kind::NanBlocks, 640, 300, 3);
     for options in paper_options().iter().step_by(5) {
         worst.check(&cloud, "several tiles", options);
@@ -172,12 +172,7 @@ fn the_papers_largest_windows_equal_the_plain_form() {
 #[test]
 fn windows_near_depth_changes_and_creases_equal_the_plain_form() {
     let mut worst = Worst::default();
-    for (seed, kind) in (0..).zip(Kind::ALL) {
-        let cloud = Cloud::new(kind, 93, 71, seed);
-        for options in edge_options() {
-            worst.check(&cloud, &format!("{kind:?}"), &options);
-        }
-    }
+    worst.check_every_kind(93, 71, &edge_options());
     let cloud = Cloud::new(Kind::NanBlocks, 640, 300, 3);
     let mut options = Options::default();
     options.semantics = Semantics::Paper;

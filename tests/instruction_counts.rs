@@ -6,8 +6,8 @@
 //! the bounds to the counts and 15 %: `... -- print` ends with the table as it should then be. With `IINE_ISA=sse2`
 //! it does so for the other column.
 //!
-//! The program runs itself under valgrind: `frames N SEMANTICS METHOD POLICY` computes N frames. The counts are the difference
-//! between two frames and one, so neither start nor the first frame's allocations are in them.
+//! The program runs itself under valgrind: `frames N SEMANTICS METHOD POLICY` computes N frames. The counts are the
+//! difference between two frames and one, so neither start nor the first frame's allocations are in them.
 
 #[path = "../benches/common/mod.rs"]
 mod common;

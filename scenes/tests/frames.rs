@@ -104,14 +104,15 @@ fn ascii_files_are_read() {
 #[test]
 fn real_frames_are_read() {
     let frames = [
-        (640, 480, 0.81),
-        (640, 480, 0.786),
-        (640, 480, 0.828),
-        (1024, 128, 1.0),
-        (640, 480, 0.933),
-        (640, 480, 0.681),
+        ("kinect_capture0001", 640, 480, 0.81),
+        ("milk_cartoon_all_small_clorox", 640, 480, 0.786),
+        ("office1", 640, 480, 0.828),
+        ("ouster_os1_128", 1024, 128, 1.0),
+        ("realsense_d435", 640, 480, 0.933),
+        ("table_scene_mug_stereo_textured", 640, 480, 0.681),
     ];
-    for (name, (width, height, valid)) in REAL_FRAMES.into_iter().zip(frames) {
+    assert_eq!(frames.map(|(name, ..)| name), REAL_FRAMES);
+    for (name, width, height, valid) in frames {
         let Some(pcd) = real_frame("real_frames_are_read", name) else { continue };
         assert_eq!((pcd.width, pcd.height), (width, height), "{name}");
         let finite = pcd.points.iter().filter(|point| point.iter().all(|c| c.is_finite())).count();

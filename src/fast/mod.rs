@@ -74,6 +74,13 @@ struct WorkerScratch {
 }
 
 impl Scratch {
+    /// So many workers, as far as there can be, and scratch memory for each.
+    fn prepare(&mut self, threads: usize) -> Result<(), Error> {
+        self.workers.prepare(threads)?;
+        self.each.resize_with(self.workers.count().max(self.each.len()), Mutex::default);
+        Ok(())
+    }
+
     /// Bytes held.
     pub fn size(&self) -> usize {
         let each = self.each.iter().map(|scratch| lock(scratch).size()).sum::<usize>();
@@ -128,11 +135,10 @@ pub(crate) fn compute(
     normals: &Normals,
     scratch: &mut Scratch,
 ) -> Result<(), Error> {
-    scratch.workers.prepare(options.threads)?;
+    scratch.prepare(options.threads)?;
     let (width, height) = (points.width(), points.height());
     let Scratch { workers, rows, each, listed, chunks, .. } = scratch;
     let count = workers.count();
-    each.resize_with(count.max(each.len()), Mutex::default);
 
     let image = Image { width, height, border_policy: options.border_policy };
     let whole_points = points.has_whole_points(normals);

@@ -3,7 +3,7 @@
 
 use super::{Estimate, is_finite, start};
 use crate::cloud::Points;
-use crate::eigen::{Symmetric3, eigen, smallest_eigenpair};
+use crate::eigen::{Scatter, Symmetric3, smallest_eigenpair};
 use crate::window::Image;
 
 /// The plain form: the matrix about the window's mean, in two passes.
@@ -15,7 +15,8 @@ pub(crate) fn estimate(
     pixel: (usize, usize),
     size: (usize, usize),
 ) -> Estimate {
-    scatter(points, image, pixel, size).map_or(Estimate::NONE, |found| from_covariance(&found.0))
+    scatter(points, image, pixel, size)
+        .map_or(Estimate::NONE, |scatter| from_covariance(&scatter.matrix))
 }
 
 /// The eigenvalues of the window's covariance matrix, ascending; none if the window has no finite point.
@@ -25,22 +26,21 @@ pub(crate) fn eigenvalues(
     pixel: (usize, usize),
     size: (usize, usize),
 ) -> Option<[f64; 3]> {
-    let (scatter, count) = scatter(points, image, pixel, size)?;
-    Some(eigen(&scatter).0.map(|value| value / count))
+    Some(scatter(points, image, pixel, size)?.eigenvalues())
 }
 
-/// The covariance matrix times the number of finite points, and that number.
+/// Of the window's finite points.
 fn scatter(
     points: &Points,
     image: &Image,
     (x, y): (usize, usize),
     (width, height): (usize, usize),
-) -> Option<(Symmetric3, f64)> {
+) -> Option<Scatter> {
     let window = (start(x, width), start(y, height));
     let rects = image.rects(window, (width, height));
     let pixels = || rects.clone().flat_map(|rect| rect.pixels());
     let finite = |(x, y)| Some(points.at(x, y)).filter(|point| is_finite(*point));
-    Symmetric3::scatter(|| pixels().filter_map(finite).map(|point| point.map(f64::from)))
+    Scatter::of(|| pixels().filter_map(finite).map(|point| point.map(f64::from)))
 }
 
 /// The estimate from a (scaled) covariance matrix.

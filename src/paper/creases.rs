@@ -6,7 +6,7 @@ use crate::methods::Estimate;
 
 /// Integral images of the first pass' normals.
 pub(crate) struct SummedNormals {
-    sums: SummedArea<f64, 4>,
+    sums: SummedArea<4>,
 }
 
 impl SummedNormals {

@@ -11,7 +11,8 @@
 use std::ops::Range;
 
 use super::cloud::Cloud;
-use super::planes::{Plane, inverse_depth};
+use super::distance::least_steps;
+use super::planes::{JITTER, Plane, inverse_depth};
 use super::rect::Rect;
 
 /// Where there are depth changes, row by row.
@@ -67,8 +68,6 @@ impl DepthChanges {
         /// How far the surface is looked at along and across a change, in pixels.
         const ALONG: usize = 5;
         const ACROSS: usize = 2;
-        /// With the sensor's noise along the rows and columns, neighbours differ by up to this many times the slope.
-        const JITTER: f64 = 4.0;
         let Self { width, height, .. } = *self;
         let inverse = |at: usize| f64::from(inverse_depth(cloud.depths[at]));
         // `at` is the last pixel before the change, the `i`-th of its row or column, which is the `j`-th; `step`
@@ -88,7 +87,7 @@ impl DepthChanges {
             let slope = |rect: &Rect| Plane::of(cloud, rect).map(|plane| plane.slope[axis].abs());
             let slopes = [slope(&before), slope(&after)].into_iter().flatten();
             let slope = slopes.reduce(f64::min).unwrap_or(0.0);
-            jump <= JITTER * slope * gap as f64
+            jump <= f64::from(JITTER) * slope * gap as f64
         };
         let mut left = DepthChanges { width, height, right: vec![], below: vec![] };
         let at = |at: usize| (at % width, at / width);
@@ -104,46 +103,26 @@ impl DepthChanges {
     }
 
     /// The largest radius around every pixel, row by row, of a window in which no two neighbours are a depth change
-    /// apart; `u32::MAX` if there is no change in the image.
+    /// apart; more than any image has if there is no change.
     pub fn clean_radii(&self) -> Vec<u32> {
         let Self { width, height, .. } = *self;
-        // 0 wherever the pixels around have a change among them, and the chessboard distance from there.
-        let mut radii = vec![u32::MAX; width * height];
+        // The pixels that have a change among those next to them: the radius is the chessboard distance from them.
+        let mut spoilt = vec![false; width * height];
         let mut spoil = |columns: Range<usize>, rows: Range<usize>| {
             for y in rows {
-                radii[y * width..][columns.clone()].fill(0);
+                spoilt[y * width..][columns.clone()].fill(true);
             }
         };
-        let around = |at: usize, pixels: usize, size: usize| {
-            at.saturating_sub(1)..(at + pixels + 1).min(size)
-        };
+        let around = |at: usize, size: usize| at.saturating_sub(1)..(at + 2).min(size);
         for (at, (right, below)) in self.right.iter().zip(&self.below).enumerate() {
             let (x, y) = (at % width, at / width);
             if *right {
-                spoil(x..x + 2, around(y, 1, height));
+                spoil(x..x + 2, around(y, height));
             }
             if *below {
-                spoil(around(x, 1, width), y..y + 2);
+                spoil(around(x, width), y..y + 2);
             }
         }
-        let next = |radius: u32| radius.saturating_add(1);
-        for y in 0..height {
-            for x in 0..width {
-                let at = y * width + x;
-                let above = (y > 0).then(|| around(x, 1, width)).into_iter().flatten();
-                let before = above.map(|x| (y - 1) * width + x).chain((x > 0).then(|| at - 1));
-                radii[at] = before.fold(radii[at], |least, other| least.min(next(radii[other])));
-            }
-        }
-        for y in (0..height).rev() {
-            for x in (0..width).rev() {
-                let at = y * width + x;
-                let under = (y + 1 < height).then(|| around(x, 1, width)).into_iter().flatten();
-                let after = under.map(|x| (y + 1) * width + x);
-                let after = after.chain((x + 1 < width).then(|| at + 1));
-                radii[at] = after.fold(radii[at], |least, other| least.min(next(radii[other])));
-            }
-        }
-        radii
+        least_steps(&spoilt, width, height, 1, 1)
     }
 }

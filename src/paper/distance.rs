@@ -64,12 +64,29 @@ fn euclidean(changes: &[bool], width: usize, height: usize) -> Vec<f32> {
     map
 }
 
-/// Two passes with weights 3 and 4 (Borgefors, *Distance Transformations in Digital Images*, 1986), over 3.
+/// Steps with weights 3 and 4 (Borgefors, *Distance Transformations in Digital Images*, 1986), over 3.
 fn chamfer(changes: &[bool], width: usize, height: usize) -> Vec<f32> {
     const STRAIGHT: u32 = 3;
     const DIAGONAL: u32 = 4;
-    const FAR: u32 = u32::MAX / 2;
-    let mut map: Vec<u32> = changes.iter().map(|&change| if change { 0 } else { FAR }).collect();
+    let pixels = |value: u32| {
+        if value >= FAR { f32::INFINITY } else { value as f32 / STRAIGHT as f32 }
+    };
+    least_steps(changes, width, height, STRAIGHT, DIAGONAL).into_iter().map(pixels).collect()
+}
+
+/// What [`least_steps`] gives where there is no pixel to come from, or more.
+const FAR: u32 = u32::MAX / 2;
+
+/// The least weight of the steps along rows and columns and along diagonals that lead to every pixel from one of the
+/// `starts`, in two passes.
+pub(crate) fn least_steps(
+    starts: &[bool],
+    width: usize,
+    height: usize,
+    straight: u32,
+    diagonal: u32,
+) -> Vec<u32> {
+    let mut map: Vec<u32> = starts.iter().map(|&start| if start { 0 } else { FAR }).collect();
     let relax = |map: &mut [u32], x: usize, y: usize, backward: bool| {
         let step = |dx: isize, dy: isize, weight: u32, map: &[u32]| {
             let sign = if backward { -1 } else { 1 };
@@ -77,10 +94,10 @@ fn chamfer(changes: &[bool], width: usize, height: usize) -> Vec<f32> {
             let ny = y.checked_add_signed(sign * dy).filter(|ny| *ny < height);
             nx.zip(ny).map_or(FAR, |(nx, ny)| map[ny * width + nx] + weight)
         };
-        let nearest = step(-1, 0, STRAIGHT, map)
-            .min(step(0, -1, STRAIGHT, map))
-            .min(step(-1, -1, DIAGONAL, map))
-            .min(step(1, -1, DIAGONAL, map));
+        let nearest = step(-1, 0, straight, map)
+            .min(step(0, -1, straight, map))
+            .min(step(-1, -1, diagonal, map))
+            .min(step(1, -1, diagonal, map));
         map[y * width + x] = map[y * width + x].min(nearest);
     };
     for at in 0..width * height {
@@ -89,10 +106,7 @@ fn chamfer(changes: &[bool], width: usize, height: usize) -> Vec<f32> {
     for at in (0..width * height).rev() {
         relax(&mut map, at % width, at / width, true);
     }
-    let pixels = |value: u32| {
-        if value >= FAR { f32::INFINITY } else { value as f32 / STRAIGHT as f32 }
-    };
-    map.into_iter().map(pixels).collect()
+    map
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 //! window's plane, or a pixel that does not, bend it by some share of their deviation over L.
 
 use super::cloud::Cloud;
-use super::planes::{Plane, inverse_depth};
+use super::planes::{JITTER, Plane, inverse_depth};
 use super::rect::Rect;
 
 /// Inverse depths that deviate less than this many alpha from a plane are as good as in it.
@@ -31,8 +31,6 @@ pub(crate) const JAGGED_RADIUS: u32 = 2;
 pub(crate) const JAGGED_POINTS: f64 = 0.8;
 /// How many pixels beyond its window's edge a plane may be taken for a pixel's: outlines are ragged.
 const REACH: u32 = 3;
-/// The sensor's noise along rows and columns, in pixels: it moves a point off a steep plane.
-const JITTER: f32 = 4.0;
 
 /// A pixel's even window, and what it is worth.
 #[derive(Clone, Copy, Default)]
@@ -179,7 +177,7 @@ impl EvenWindows<'_> {
 
         let noise = noise.max(self.asked.least_noise);
         let near = self.near(pixel);
-        let point = 1.0 / cloud.depths[own];
+        let point = inverse_depth(cloud.depths[own]);
         let mut best: Option<(f32, usize)> = None;
         for &Candidate { at, to_pixel: [dx, dy], short } in found.iter() {
             let window = &self.windows[at];

@@ -2,7 +2,7 @@
 
 use super::cloud::CleanPoints;
 use super::rect::Rect;
-use crate::eigen::{Symmetric3, eigen};
+use crate::eigen::{Scatter, eigen};
 use crate::methods::{Estimate, normal_of_tangents};
 use crate::options::Method;
 
@@ -18,9 +18,9 @@ pub(crate) fn estimate(method: Method, cloud: &impl CleanPoints, rect: &Rect) ->
 /// CM (Eq. 16-25): the eigenvector of the smallest eigenvalue of the points' covariance matrix, and that eigenvalue
 /// over the trace as curvature. None if the points are on one line.
 pub(crate) fn plane_of<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> Option<Estimate> {
-    let (scatter, count) = Symmetric3::scatter(points)?;
-    let (values, vector) = eigen(&scatter);
-    let trace = scatter.trace();
+    let Scatter { matrix, count, .. } = Scatter::of(points)?;
+    let (values, vector) = eigen(&matrix);
+    let trace = matrix.trace();
     // Rounding keeps points on a line from a middle eigenvalue of exactly 0.
     const LINE: f64 = 1e-12;
     if count < 3.0 || values[1] <= LINE * trace {
@@ -32,8 +32,7 @@ pub(crate) fn plane_of<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> 
 /// The eigenvalues of the covariance matrix (Eq. 16) of the finite points in a rectangle, ascending; none if there
 /// are no points.
 pub(crate) fn eigenvalues(cloud: &impl CleanPoints, rect: &Rect) -> Option<[f64; 3]> {
-    let (scatter, count) = Symmetric3::scatter(|| cloud.finite(rect))?;
-    Some(eigen(&scatter).0.map(|value| value / count))
+    Some(Scatter::of(|| cloud.finite(rect))?.eigenvalues())
 }
 
 /// The 3-D gradient method: the cross product of the mean central differences of the points.

@@ -225,7 +225,7 @@ pub(crate) fn estimates(
                 })
         };
         if options.one_sided_windows && sizes[at] < wanted[at] {
-            u32::BITS as u8
+            EVERY_LEVEL
         } else if !cloud.is_missing(at) && is_near_crease() {
             CREASE_LEVELS
         } else {
@@ -290,6 +290,9 @@ pub(crate) fn estimates(
     }
     Ok(estimates)
 }
+
+/// As often as a radius can be halved.
+const EVERY_LEVEL: u8 = u32::BITS as u8;
 
 /// A crease does not bound the windows next to it as a depth change does: of the sizes that are tried, these many.
 const CREASE_LEVELS: u8 = 2;

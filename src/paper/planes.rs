@@ -5,6 +5,10 @@
 
 use super::cloud::Cloud;
 use super::rect::Rect;
+use crate::eigen::{Scatter, Symmetric3};
+
+/// The sensor's noise along rows and columns, in pixels: it moves points off steep planes by that many times the slope.
+pub(crate) const JITTER: f32 = 4.0;
 
 /// The linear function of the position that fits the inverse depths in a rectangle best.
 #[derive(Clone, Copy)]
@@ -28,29 +32,15 @@ impl Plane {
     /// None if there are too few finite points to tell how well the plane fits, or if they are on one line of the
     /// image.
     pub fn of(cloud: &Cloud, rect: &Rect) -> Option<Plane> {
-        let points = || {
-            let place = |(x, y): (usize, usize)| {
-                [x as f64, y as f64, f64::from(inverse_depth(cloud.depths[cloud.index(x, y)]))]
-            };
-            rect.pixels().map(place).filter(|point| !point[2].is_nan())
+        let place = |(x, y): (usize, usize)| {
+            [x as f64, y as f64, f64::from(inverse_depth(cloud.depths[cloud.index(x, y)]))]
         };
-        let (mut n, mut mean) = (0.0, [0.0; 3]);
-        for point in points() {
-            n += 1.0;
-            for (sum, value) in mean.iter_mut().zip(point) {
-                *sum += value;
-            }
-        }
+        let points = || rect.pixels().map(place).filter(|point| !point[2].is_nan());
+        let Scatter { matrix, mean, count: n } = Scatter::of(points)?;
         if n < Self::FEWEST {
             return None;
         }
-        mean = mean.map(|sum| sum / n);
-        let [mut xx, mut xy, mut yy, mut xr, mut yr, mut rr] = [0.0; 6];
-        for point in points() {
-            let [x, y, r] = [0, 1, 2].map(|i| point[i] - mean[i]);
-            (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
-            (xr, yr, rr) = (xr + x * r, yr + y * r, rr + r * r);
-        }
+        let Symmetric3 { xx, xy, xz: xr, yy, yz: yr, zz: rr } = matrix;
         let determinant = xx * yy - xy * xy;
         if determinant <= Self::LINE * xx * yy {
             return None;

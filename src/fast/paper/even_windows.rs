@@ -3,8 +3,8 @@
 
 use std::ops::Range;
 
-use super::integrals::{Channels, Counted, Rings, rows_of_rings};
-use super::methods::MOMENTS;
+use super::integrals::{Rings, reached, rows_of_rings};
+use super::methods::{CovarianceMatrix, MOMENTS, Sums};
 use super::rects::{Place, Rects};
 use crate::fast::Parts;
 use crate::fast::arithmetic::{Doubles, Floats};
@@ -27,24 +27,11 @@ pub(super) struct EvenTile<'a> {
     pub largest: usize,
 }
 
-/// Moments of the positions, from the rings' first on, and of the inverse depths, from one of the tile's on.
-struct Positions {
-    top: usize,
-    origin: f64,
-}
-
-impl Channels<MOMENTS> for Positions {
-    #[inline(always)]
-    fn of(&self, own: &Counted, _: [&Counted; 2], _: [&Counted; 2]) -> [f64; MOMENTS] {
-        let [x, y, r, count] = own.map(f64::from);
-        let r = (r - self.origin) * count;
-        [x, y, r, count, x * x, x * y, x * r, y * y, y * r, r * r]
-    }
-}
-
 /// Eight windows and their planes.
 #[derive(Clone, Copy)]
 struct Fits<S: Simd> {
+    /// 0 for no window.
+    radii: Doubles<S>,
     /// Of the planes at the pixels.
     inverse_depth: Doubles<S>,
     slope: [Doubles<S>; 2],
@@ -61,42 +48,40 @@ impl<S: Simd> Fits<S> {
     unsafe fn none() -> Self {
         // SAFETY: as the caller's.
         let zero = unsafe { Doubles::splat(0.0) };
-        let slope = [zero; 2];
-        Fits { inverse_depth: zero, slope, points: zero, unevenness: zero, noise: zero }
+        let [radii, inverse_depth, points, unevenness, noise] = [zero; 5];
+        Fits { radii, inverse_depth, slope: [zero; 2], points, unevenness, noise }
     }
 
     /// Takes the lanes of another.
     #[inline(always)]
     fn take(&mut self, lanes: u32, other: &Self) {
-        let Fits { inverse_depth, slope, points, unevenness, noise } = self;
-        let [across, down] = slope;
-        let to = [inverse_depth, across, down, points, unevenness, noise];
+        let Fits { radii, inverse_depth, slope: [across, down], points, unevenness, noise } = self;
+        let to = [radii, inverse_depth, across, down, points, unevenness, noise];
         let [across, down] = other.slope;
-        let Fits { inverse_depth, points, unevenness, noise, .. } = *other;
-        let from = [inverse_depth, across, down, points, unevenness, noise];
+        let Fits { radii, inverse_depth, points, unevenness, noise, .. } = *other;
+        let from = [radii, inverse_depth, across, down, points, unevenness, noise];
         for (to, from) in to.into_iter().zip(from) {
             // SAFETY: there is a group, so there is the instruction set.
             to.0 = unsafe { S::select_bits_d(lanes, from.0, to.0) };
         }
     }
 
-    /// The windows of these radii, 0 for none.
     #[inline(always)]
-    fn windows(&self, radii: &[u32; GROUP]) -> [EvenWindow; GROUP] {
-        let Fits { inverse_depth, slope: [across, down], points, unevenness, noise } = *self;
-        let mut fields = [[0.0; GROUP]; 6];
-        let values = [inverse_depth, across, down, points, unevenness, noise];
+    fn windows(&self) -> [EvenWindow; GROUP] {
+        let Fits { radii, inverse_depth, slope: [across, down], points, unevenness, noise } = *self;
+        let mut fields = [[0.0; GROUP]; 7];
+        let values = [radii, inverse_depth, across, down, points, unevenness, noise];
         for (field, value) in fields.iter_mut().zip(values) {
             // SAFETY: there is a group, so there is the instruction set.
             unsafe { S::store(field.as_mut_ptr(), value.narrow().0) };
         }
         let mut windows = [EvenWindow::default(); GROUP];
         for lane in 0..GROUP {
-            if radii[lane] > 0 {
-                let [inverse_depth, across, down, points, unevenness, noise] =
-                    fields.each_ref().map(|field| field[lane]);
+            let [radius, inverse_depth, across, down, points, unevenness, noise] =
+                fields.each_ref().map(|field| field[lane]);
+            if radius > 0.0 {
                 let slope = [across, down];
-                let worth = EvenWindow::worth(radii[lane], points);
+                let worth = EvenWindow::worth(radius as u32, points);
                 windows[lane] = EvenWindow { inverse_depth, slope, unevenness, noise, ..worth };
             }
         }
@@ -112,18 +97,16 @@ impl EvenTile<'_> {
     #[inline(always)]
     pub unsafe fn compute<S: Simd>(&self, rings: &mut Rings<MOMENTS>, image: &Parts<EvenWindow>) {
         let reach = self.largest;
-        let columns =
-            self.columns.start.saturating_sub(reach)..(self.columns.end + reach).min(self.width);
-        let (top, bottom) =
-            (self.rows.start.saturating_sub(reach), (self.rows.end + reach).min(self.height));
-        let positions = Positions { top, origin: f64::from(self.origin()) };
-        rings.start(columns.clone(), top, rows_of_rings(reach, self.height));
+        let columns = reached(&self.columns, reach, self.width);
+        let Range { start: top, end: bottom } = reached(&self.rows, reach, self.height);
+        let moments =
+            CovarianceMatrix { origin: [columns.start as f32, top as f32, self.origin()] };
+        rings.start(columns, top, rows_of_rings(reach, self.height));
         let mut next = top;
         for y in self.rows.clone() {
             while next < (y + reach + 1).min(bottom) {
-                let depths = &self.depths[next * self.width..][columns.clone()];
-                rings.read_positions(next, (next - top) as f32, depths);
-                rings.push(&positions, next);
+                rings.read_positions(&self.depths[next * self.width..], next);
+                rings.push(&moments, next);
                 next += 1;
             }
             for x in self.columns.clone().step_by(GROUP) {
@@ -131,7 +114,7 @@ impl EvenTile<'_> {
                 let count = (self.columns.end - x).min(GROUP);
                 // SAFETY: as the caller's.
                 unsafe {
-                    let windows = self.eight::<S>(rings, &positions, (x, y), count);
+                    let windows = self.eight::<S>(rings, &moments, (x, y), count);
                     image.part(first..first + count).copy_from_slice(&windows[..count]);
                 }
             }
@@ -153,7 +136,7 @@ impl EvenTile<'_> {
     unsafe fn eight<S: Simd>(
         &self,
         rings: &Rings<MOMENTS>,
-        positions: &Positions,
+        moments: &CovarianceMatrix,
         pixel: (usize, usize),
         count: usize,
     ) -> [EvenWindow; GROUP] {
@@ -170,16 +153,14 @@ impl EvenTile<'_> {
         // SAFETY: as the caller's.
         unsafe {
             let mut found = Fits::<S>::none();
-            let mut windows = [0; GROUP];
             // On steep surfaces, windows with depth changes.
             let mut radii = wanted;
             let mut todo = above(&radii, &clean) & above(&radii, &[JAGGED_RADIUS - 1; GROUP]);
             let mut done = 0;
             while todo != 0 {
-                let (fits, there) = self.fits::<S>(rings, positions, pixel, &radii, todo);
+                let (fits, there) = self.fits::<S>(rings, moments, pixel, &radii, todo);
                 let jagged = there & self.jagged(&fits, pixel, &radii, count);
                 found.take(jagged, &fits);
-                take(jagged, &mut windows, &radii);
                 done |= jagged;
                 for radius in &mut radii {
                     *radius = *radius * 7 / 10;
@@ -193,20 +174,19 @@ impl EvenTile<'_> {
             let least = Doubles::splat(f64::from(self.asked.least_noise));
             let mut is_first = true;
             while todo != 0 {
-                let (fits, there) = self.fits::<S>(rings, positions, pixel, &radii, todo);
+                let (fits, there) = self.fits::<S>(rings, moments, pixel, &radii, todo);
                 todo = there;
                 if !is_first {
                     todo &= fits.noise.max(least).lt(found.unevenness);
                 }
                 found.take(todo, &fits);
-                take(todo, &mut windows, &radii);
                 todo &= above(&radii, &[1; GROUP]);
                 for radius in &mut radii {
                     *radius /= 2;
                 }
                 is_first = false;
             }
-            found.windows(&windows)
+            found.windows()
         }
     }
 
@@ -218,7 +198,7 @@ impl EvenTile<'_> {
     unsafe fn fits<S: Simd>(
         &self,
         rings: &Rings<MOMENTS>,
-        positions: &Positions,
+        moments: &CovarianceMatrix,
         (x, y): (usize, usize),
         radii: &[u32; GROUP],
         lanes: u32,
@@ -229,14 +209,10 @@ impl EvenTile<'_> {
         let mut numbers = [[0.0; GROUP]; MOMENTS];
         // SAFETY: as the caller's.
         unsafe {
-            let floats = radii.map(|radius| radius as f32);
-            let rects = Rects::new::<S>(&place, S::load(floats.as_ptr()), false, false);
+            let radii = Floats(S::load(radii.map(|radius| radius as f32).as_ptr()));
+            let rects = Rects::new::<S>(&place, radii.0, false, false);
             for lane in Bits(lanes) {
-                let [a, b, c, d] =
-                    rects.corners.each_ref().map(|i| sums.get_unchecked(i[lane] as usize));
-                for i in 0..MOMENTS {
-                    numbers[i][lane] = (d[i] - c[i]) - (b[i] - a[i]);
-                }
+                CovarianceMatrix::take(&mut numbers, lane, rects.sum(lane, sums), &rects, &[]);
             }
             let mut sums = [Doubles::<S>::splat(0.0); MOMENTS];
             for i in 0..MOMENTS {
@@ -259,13 +235,16 @@ impl EvenTile<'_> {
             // The pixels' own positions.
             let mut columns = [0.0; GROUP];
             for (lane, column) in columns.iter_mut().enumerate() {
-                *column = (x - left + lane) as f64;
+                *column = (x + lane) as f64;
             }
-            let columns = Doubles(S::load_d(columns.as_ptr()));
-            let row = Doubles::splat((y - positions.top) as f64);
-            let mean = Doubles::splat(positions.origin) + mr;
-            let inverse_depth = mean + slope[0] * (columns - mx) + slope[1] * (row - my);
-            (Fits { inverse_depth, slope, points: n, unevenness, noise }, there)
+            let [left, top, origin] = moments.origin.map(|o| Doubles::splat(f64::from(o)));
+            let across = Doubles(S::load_d(columns.as_ptr())) - left - mx;
+            let down = Doubles::splat(y as f64) - top - my;
+            let inverse_depth = origin + mr + slope[0] * across + slope[1] * down;
+            (
+                Fits { radii: radii.widen(), inverse_depth, slope, points: n, unevenness, noise },
+                there,
+            )
         }
     }
 
@@ -304,11 +283,4 @@ fn above(values: &[u32; GROUP], others: &[u32; GROUP]) -> u32 {
         lanes |= u32::from(values[lane] > others[lane]) << lane;
     }
     lanes
-}
-
-#[inline(always)]
-fn take(lanes: u32, windows: &mut [u32; GROUP], radii: &[u32; GROUP]) {
-    for lane in Bits(lanes) {
-        windows[lane] = radii[lane];
-    }
 }

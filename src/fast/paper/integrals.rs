@@ -40,6 +40,11 @@ impl<const N: usize> Default for Rings<N> {
     }
 }
 
+/// The columns or rows, of so many, that windows of those in `range` reach at a distance from their pixels at most.
+pub(crate) fn reached(range: &Range<usize>, reach: usize, count: usize) -> Range<usize> {
+    range.start.saturating_sub(reach)..(range.end + reach).min(count)
+}
+
 /// Rows of the rings for windows that reach a distance from their pixels, in an image of this height: theirs, and
 /// those above and below.
 pub(crate) fn rows_of_rings(reach: usize, height: usize) -> usize {
@@ -148,16 +153,16 @@ impl<const N: usize> Rings<N> {
         to[count..].fill([0.0; 4]);
     }
 
-    /// Reads the row of `depths` as points whose x is the column in the rings, whose y is given, and whose z is the
-    /// inverse depth.
-    pub fn read_positions(&mut self, y: usize, of_row: f32, depths: &[f32]) {
+    /// Reads row `y`, of which `depths` are the image's, as points: column, row and inverse depth.
+    pub fn read_positions(&mut self, depths: &[f32], y: usize) {
         let row = self.row(y);
-        let to = &mut self.points[row][1..];
-        for (x, (to, depth)) in to.iter_mut().zip(depths).enumerate() {
+        let depths = &depths[self.columns.clone()];
+        let (to, rest) = self.points[row][1..].split_at_mut(depths.len());
+        for ((x, depth), to) in self.columns.clone().zip(depths).zip(to) {
             let inverse = inverse_depth(*depth);
-            *to = if inverse.is_nan() { [0.0; 4] } else { [x as f32, of_row, inverse, 1.0] };
+            *to = if inverse.is_nan() { [0.0; 4] } else { [x as f32, y as f32, inverse, 1.0] };
         }
-        to[depths.len()..].fill([0.0; 4]);
+        rest.fill([0.0; 4]);
     }
 
     /// Has no points in row `y`: it is outside the image.

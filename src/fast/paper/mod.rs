@@ -117,7 +117,7 @@ pub(crate) fn compute_of_radii(
     job.tiles(scratch, None, normals, largest)
 }
 
-/// The even windows of all pixels, row by row.
+/// The even windows of the needed pixels, row by row.
 pub(crate) fn even_windows(
     isa: Isa,
     cloud: &Cloud,
@@ -125,9 +125,8 @@ pub(crate) fn even_windows(
     threads: usize,
     scratch: &mut super::Scratch,
 ) -> Result<Vec<EvenWindow>, Error> {
-    scratch.workers.prepare(threads)?;
+    scratch.prepare(threads)?;
     let super::Scratch { workers, each, .. } = scratch;
-    each.resize_with(workers.count().max(each.len()), Default::default);
     let &Cloud { width, height, ref depths, .. } = cloud;
     let mut windows = vec![EvenWindow::default(); width * height];
     let image = Parts(windows.as_mut_ptr());
@@ -197,9 +196,8 @@ impl<'a> Job<'a> {
     #[inline(never)]
     fn depths(&self, scratch: &mut super::Scratch) -> Result<(), Error> {
         let &Job { points, options, whole_points, .. } = self;
-        scratch.workers.prepare(options.threads)?;
+        scratch.prepare(options.threads)?;
         let super::Scratch { workers, each, paper, .. } = scratch;
-        each.resize_with(workers.count().max(each.len()), Default::default);
         let length = row_length(points.width());
         reserve(&mut paper.depths, length * points.height(), 0.0)?;
         let parts = Parts(paper.depths.as_mut_ptr());

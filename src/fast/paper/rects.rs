@@ -74,6 +74,22 @@ impl Rects {
         rects
     }
 
+    /// The sum over a window (Eq. 3, not divided).
+    ///
+    /// # Safety
+    /// The corners are indices of `sums`.
+    #[inline(always)]
+    pub unsafe fn sum<const N: usize>(&self, lane: usize, sums: &[[f64; N]]) -> [f64; N] {
+        // SAFETY: promised by the caller.
+        let at = |corner: usize| unsafe { sums.get_unchecked(self.corners[corner][lane] as usize) };
+        let [a, b, c, d] = [at(0), at(1), at(2), at(3)];
+        let mut sum = [0.0; N];
+        for i in 0..N {
+            sum[i] = (d[i] - c[i]) - (b[i] - a[i]);
+        }
+        sum
+    }
+
     /// Where an end of a window's middle row (`line` 0) or column is missing: the differences in x and y between the
     /// outermost points that are there, and how far they are apart; zeros if there are not two.
     pub fn outermost(&self, line: usize, lane: usize, points: &[Counted]) -> [f32; 4] {

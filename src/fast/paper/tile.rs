@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::integrals::{Rings, rows_of_rings};
+use super::integrals::{Rings, reached, rows_of_rings};
 use super::methods::{Sums, by_number};
 use super::rects::{Place, Rects};
 use crate::cloud::Points;
@@ -40,10 +40,8 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
     ) {
         let (width, height) = (self.points.width(), self.points.height());
         let reach = self.largest;
-        let columns =
-            self.columns.start.saturating_sub(reach)..(self.columns.end + reach).min(width);
-        let (top, bottom) =
-            (self.rows.start.saturating_sub(reach), (self.rows.end + reach).min(height));
+        let columns = reached(&self.columns, reach, width);
+        let Range { start: top, end: bottom } = reached(&self.rows, reach, height);
         let count = columns.len() * (bottom - top);
         rings.start(columns, top, rows_of_rings(reach, height));
         // SAFETY: as the caller's.
@@ -112,13 +110,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 while todo != 0 {
                     let lane = todo.trailing_zeros() as usize % GROUP;
                     todo &= todo - 1;
-                    let [a, b, c, d] =
-                        rects.corners.each_ref().map(|i| sums.get_unchecked(i[lane] as usize));
-                    let mut sum = [0.0; N];
-                    for i in 0..N {
-                        sum[i] = (d[i] - c[i]) - (b[i] - a[i]);
-                    }
-                    M::take(&mut numbers, lane, sum, &rects, points);
+                    M::take(&mut numbers, lane, rects.sum(lane, sums), &rects, points);
                 }
                 let mut fresh = 0;
                 let found = loop {
