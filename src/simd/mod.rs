@@ -30,6 +30,8 @@ pub(crate) trait Simd: Copy {
 
     unsafe fn splat(value: f32) -> Self::F;
     unsafe fn load(from: *const f32) -> Self::F;
+    /// Lanes 0 to 3 from one place, 4 to 7 from another.
+    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F;
     unsafe fn store(to: *mut f32, value: Self::F);
     unsafe fn add(a: Self::F, b: Self::F) -> Self::F;
     unsafe fn sub(a: Self::F, b: Self::F) -> Self::F;
@@ -51,6 +53,8 @@ pub(crate) trait Simd: Copy {
     unsafe fn and_not(mask: Self::F, a: Self::F) -> Self::F;
     /// Bit l is lane l of a mask.
     unsafe fn bits(mask: Self::F) -> u32;
+    /// Lane i of row j becomes lane j of row i, among lanes 0 to 3 and among lanes 4 to 7.
+    unsafe fn transpose_halves(rows: [Self::F; 4]) -> [Self::F; 4];
 
     unsafe fn load_i(from: *const i32) -> Self::I;
     unsafe fn store_i(to: *mut i32, value: Self::I);
@@ -71,6 +75,8 @@ pub(crate) trait Simd: Copy {
 
     unsafe fn splat_d(value: f64) -> Self::D;
     unsafe fn load_d(from: *const f64) -> Self::D;
+    /// Lanes 0 to 3 from one place, 4 to 7 from another.
+    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D;
     unsafe fn store_d(to: *mut f64, value: Self::D);
     unsafe fn add_d(a: Self::D, b: Self::D) -> Self::D;
     unsafe fn sub_d(a: Self::D, b: Self::D) -> Self::D;
@@ -83,6 +89,8 @@ pub(crate) trait Simd: Copy {
     unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32;
     /// `lanes` bit l ? yes : no
     unsafe fn select_bits_d(lanes: u32, yes: Self::D, no: Self::D) -> Self::D;
+    /// As [`Simd::transpose_halves`].
+    unsafe fn transpose_halves_d(rows: [Self::D; 4]) -> [Self::D; 4];
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D;
     unsafe fn last_d(a: Self::D) -> Self::D;
     /// f32 to f64.

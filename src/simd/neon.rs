@@ -76,6 +76,10 @@ impl Simd for Neon {
         unsafe { [vld1q_f32(from), vld1q_f32(from.add(4))] }
     }
     #[inline(always)]
+    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {
+        unsafe { [vld1q_f32(low), vld1q_f32(high)] }
+    }
+    #[inline(always)]
     unsafe fn store(to: *mut f32, value: Self::F) {
         unsafe {
             vst1q_f32(to, value[0]);
@@ -159,6 +163,25 @@ impl Simd for Neon {
     }
 
     #[inline(always)]
+    unsafe fn transpose_halves(rows: [Self::F; 4]) -> [Self::F; 4] {
+        let [a, b, c, d] = rows;
+        let mut columns = rows;
+        for half in 0..2 {
+            unsafe {
+                let even = |a: float32x4_t, b: float32x4_t| vreinterpretq_f64_f32(vtrn1q_f32(a, b));
+                let odd = |a: float32x4_t, b: float32x4_t| vreinterpretq_f64_f32(vtrn2q_f32(a, b));
+                let (ab_even, cd_even) = (even(a[half], b[half]), even(c[half], d[half]));
+                let (ab_odd, cd_odd) = (odd(a[half], b[half]), odd(c[half], d[half]));
+                columns[0][half] = vreinterpretq_f32_f64(vtrn1q_f64(ab_even, cd_even));
+                columns[1][half] = vreinterpretq_f32_f64(vtrn1q_f64(ab_odd, cd_odd));
+                columns[2][half] = vreinterpretq_f32_f64(vtrn2q_f64(ab_even, cd_even));
+                columns[3][half] = vreinterpretq_f32_f64(vtrn2q_f64(ab_odd, cd_odd));
+            }
+        }
+        columns
+    }
+
+    #[inline(always)]
     unsafe fn load_i(from: *const i32) -> Self::I {
         unsafe { [vld1q_s32(from), vld1q_s32(from.add(4))] }
     }
@@ -236,6 +259,10 @@ impl Simd for Neon {
         }
     }
     #[inline(always)]
+    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
+        unsafe { [vld1q_f64(low), vld1q_f64(low.add(2)), vld1q_f64(high), vld1q_f64(high.add(2))] }
+    }
+    #[inline(always)]
     unsafe fn store_d(to: *mut f64, value: Self::D) {
         for (i, half) in value.into_iter().enumerate() {
             unsafe { vst1q_f64(to.add(2 * i), half) };
@@ -295,6 +322,22 @@ impl Simd for Neon {
             }
             lanes
         }
+    }
+    #[inline(always)]
+    unsafe fn transpose_halves_d(rows: [Self::D; 4]) -> [Self::D; 4] {
+        let [a, b, c, d] = rows;
+        let mut columns = rows;
+        for half in [0, 2] {
+            for i in 0..2 {
+                unsafe {
+                    columns[2 * i][half] = vtrn1q_f64(a[half + i], b[half + i]);
+                    columns[2 * i][half + 1] = vtrn1q_f64(c[half + i], d[half + i]);
+                    columns[2 * i + 1][half] = vtrn2q_f64(a[half + i], b[half + i]);
+                    columns[2 * i + 1][half + 1] = vtrn2q_f64(c[half + i], d[half + i]);
+                }
+            }
+        }
+        columns
     }
     #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
@@ -398,7 +441,10 @@ mod tests {
                 S::select(S::mask(bits), x, y),
                 S::finite(x),
                 S::narrow(S::mul_d(dx, tenth)),
+                S::load_halves(b.as_ptr().add(3), a.as_ptr().add(1)),
             ];
+            let transposed = S::transpose_halves([x, y, S::add(x, x), S::add(y, y)]);
+            let transposed_d = S::transpose_halves_d([dx, dy, S::add_d(dx, dx), S::add_d(dy, dy)]);
             let small =
                 [x, y].map(|v| S::select(S::lt(S::abs(v), S::splat(1e6)), v, S::splat(-0.5)));
             let (i, j) = (S::round_i(small[0]), S::truncate_i(small[1]));
@@ -424,14 +470,15 @@ mod tests {
                 S::add_d(S::prefix_sum_d(S::mul_d(S::widen(small[0]), tenth)), S::splat_d(0.0)),
                 S::last_d(dx),
             ];
-            for value in floats.into_iter().chain(integers.map(|i| S::float_i(i))) {
+            for value in floats.into_iter().chain(transposed).chain(integers.map(|i| S::float_i(i)))
+            {
                 let mut lanes = [0.0; 8];
                 S::store(lanes.as_mut_ptr(), value);
                 results.extend(lanes.map(|v: f32| {
                     u64::from(if v.is_nan() { f32::NAN.to_bits() } else { v.to_bits() })
                 }));
             }
-            for value in doubles {
+            for value in doubles.into_iter().chain(transposed_d) {
                 let mut lanes = [0.0; 8];
                 S::store_d(lanes.as_mut_ptr(), value);
                 results.extend(

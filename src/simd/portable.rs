@@ -48,6 +48,32 @@ fn prefix_sum<T: Copy>(mut a: [T; GROUP], add: impl Fn(T, T) -> T) -> [T; GROUP]
     a
 }
 
+/// A half from one place, the other from another.
+///
+/// # Safety
+/// Both are valid for reads of half a group.
+#[inline(always)]
+unsafe fn load_halves<T: Copy + Default>(low: *const T, high: *const T) -> [T; GROUP] {
+    let mut lanes = [T::default(); GROUP];
+    // SAFETY: promised by the caller.
+    unsafe {
+        lanes[..4].copy_from_slice(std::slice::from_raw_parts(low, 4));
+        lanes[4..].copy_from_slice(std::slice::from_raw_parts(high, 4));
+    }
+    lanes
+}
+
+#[inline(always)]
+fn transpose_halves<T: Copy>(rows: [[T; GROUP]; 4]) -> [[T; GROUP]; 4] {
+    let mut columns = rows;
+    for (i, column) in columns.iter_mut().enumerate() {
+        for (l, lane) in column.iter_mut().enumerate() {
+            *lane = rows[l % 4][l / 4 * 4 + i];
+        }
+    }
+    columns
+}
+
 impl Simd for Portable {
     type F = F;
     type I = I;
@@ -61,6 +87,11 @@ impl Simd for Portable {
     unsafe fn load(from: *const f32) -> F {
         // SAFETY: promised by the caller.
         unsafe { from.cast::<F>().read_unaligned() }
+    }
+    #[inline(always)]
+    unsafe fn load_halves(low: *const f32, high: *const f32) -> F {
+        // SAFETY: promised by the caller.
+        unsafe { load_halves(low, high) }
     }
     #[inline(always)]
     unsafe fn store(to: *mut f32, value: F) {
@@ -125,6 +156,11 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
+    unsafe fn transpose_halves(rows: [F; 4]) -> [F; 4] {
+        transpose_halves(rows)
+    }
+
+    #[inline(always)]
     unsafe fn load_i(from: *const i32) -> I {
         // SAFETY: promised by the caller.
         unsafe { from.cast::<I>().read_unaligned() }
@@ -185,6 +221,11 @@ impl Simd for Portable {
         unsafe { from.cast::<D>().read_unaligned() }
     }
     #[inline(always)]
+    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> D {
+        // SAFETY: promised by the caller.
+        unsafe { load_halves(low, high) }
+    }
+    #[inline(always)]
     unsafe fn store_d(to: *mut f64, value: D) {
         // SAFETY: promised by the caller.
         unsafe { to.cast::<D>().write_unaligned(value) }
@@ -228,6 +269,10 @@ impl Simd for Portable {
             lanes[l] = if bits >> l & 1 != 0 { yes[l] } else { no[l] };
         }
         lanes
+    }
+    #[inline(always)]
+    unsafe fn transpose_halves_d(rows: [D; 4]) -> [D; 4] {
+        transpose_halves(rows)
     }
     #[inline(always)]
     unsafe fn prefix_sum_d(a: D) -> D {

@@ -76,6 +76,11 @@ impl<S: Simd> Simd for Twice<S> {
         unsafe { [S::load(from), S::load(from.add(super::GROUP))] }
     }
     #[inline(always)]
+    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {
+        // SAFETY: as the caller's.
+        [unsafe { S::load_halves(low, high) }; 2]
+    }
+    #[inline(always)]
     unsafe fn store(to: *mut f32, value: Self::F) {
         // SAFETY: as the caller's.
         unsafe {
@@ -102,12 +107,39 @@ impl<S: Simd> Simd for Twice<S> {
         unsafe { [S::load_d(from), S::load_d(from.add(super::GROUP))] }
     }
     #[inline(always)]
+    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
+        // SAFETY: as the caller's.
+        [unsafe { S::load_halves_d(low, high) }; 2]
+    }
+    #[inline(always)]
     unsafe fn store_d(to: *mut f64, value: Self::D) {
         // SAFETY: as the caller's.
         unsafe {
             S::store_d(to, value[0]);
             S::store_d(to.add(super::GROUP), value[1]);
         }
+    }
+    #[inline(always)]
+    unsafe fn transpose_halves([a, b, c, d]: [Self::F; 4]) -> [Self::F; 4] {
+        // SAFETY: as the caller's.
+        let (first, second) = unsafe {
+            (
+                S::transpose_halves([a[0], b[0], c[0], d[0]]),
+                S::transpose_halves([a[1], b[1], c[1], d[1]]),
+            )
+        };
+        [0, 1, 2, 3].map(|row| [first[row], second[row]])
+    }
+    #[inline(always)]
+    unsafe fn transpose_halves_d([a, b, c, d]: [Self::D; 4]) -> [Self::D; 4] {
+        // SAFETY: as the caller's.
+        let (first, second) = unsafe {
+            (
+                S::transpose_halves_d([a[0], b[0], c[0], d[0]]),
+                S::transpose_halves_d([a[1], b[1], c[1], d[1]]),
+            )
+        };
+        [0, 1, 2, 3].map(|row| [first[row], second[row]])
     }
     #[inline(always)]
     unsafe fn bits(mask: Self::F) -> u32 {

@@ -49,6 +49,10 @@ impl Simd for Sse2 {
         unsafe { [_mm_loadu_ps(from), _mm_loadu_ps(from.add(4))] }
     }
     #[inline(always)]
+    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {
+        unsafe { [_mm_loadu_ps(low), _mm_loadu_ps(high)] }
+    }
+    #[inline(always)]
     unsafe fn store(to: *mut f32, value: Self::F) {
         unsafe {
             _mm_storeu_ps(to, value[0]);
@@ -110,6 +114,15 @@ impl Simd for Sse2 {
     #[inline(always)]
     unsafe fn bits(mask: Self::F) -> u32 {
         unsafe { (_mm_movemask_ps(mask[0]) | _mm_movemask_ps(mask[1]) << 4) as u32 }
+    }
+
+    #[inline(always)]
+    unsafe fn transpose_halves(rows: [Self::F; 4]) -> [Self::F; 4] {
+        let [mut a, mut b, mut c, mut d] = rows;
+        for half in 0..2 {
+            unsafe { _MM_TRANSPOSE4_PS(&mut a[half], &mut b[half], &mut c[half], &mut d[half]) };
+        }
+        [a, b, c, d]
     }
 
     #[inline(always)]
@@ -190,6 +203,17 @@ impl Simd for Sse2 {
         }
     }
     #[inline(always)]
+    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
+        unsafe {
+            [
+                _mm_loadu_pd(low),
+                _mm_loadu_pd(low.add(2)),
+                _mm_loadu_pd(high),
+                _mm_loadu_pd(high.add(2)),
+            ]
+        }
+    }
+    #[inline(always)]
     unsafe fn store_d(to: *mut f64, value: Self::D) {
         for (i, half) in value.into_iter().enumerate() {
             unsafe { _mm_storeu_pd(to.add(2 * i), half) };
@@ -242,6 +266,22 @@ impl Simd for Sse2 {
             ];
             each!(_mm_or_pd, each!(_mm_and_pd, mask, yes), each!(_mm_andnot_pd, mask, no))
         }
+    }
+    #[inline(always)]
+    unsafe fn transpose_halves_d(rows: [Self::D; 4]) -> [Self::D; 4] {
+        let [a, b, c, d] = rows;
+        let mut columns = rows;
+        for half in [0, 2] {
+            for i in 0..2 {
+                unsafe {
+                    columns[2 * i][half] = _mm_unpacklo_pd(a[half + i], b[half + i]);
+                    columns[2 * i][half + 1] = _mm_unpacklo_pd(c[half + i], d[half + i]);
+                    columns[2 * i + 1][half] = _mm_unpackhi_pd(a[half + i], b[half + i]);
+                    columns[2 * i + 1][half + 1] = _mm_unpackhi_pd(c[half + i], d[half + i]);
+                }
+            }
+        }
+        columns
     }
     #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
@@ -299,6 +339,10 @@ impl Simd for Avx2 {
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self::F {
         unsafe { _mm256_loadu_ps(from) }
+    }
+    #[inline(always)]
+    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {
+        unsafe { _mm256_loadu2_m128(high, low) }
     }
     #[inline(always)]
     unsafe fn store(to: *mut f32, value: Self::F) {
@@ -362,6 +406,20 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    unsafe fn transpose_halves([a, b, c, d]: [Self::F; 4]) -> [Self::F; 4] {
+        unsafe {
+            let (ab_low, cd_low) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
+            let (ab_high, cd_high) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
+            [
+                _mm256_shuffle_ps::<0x44>(ab_low, cd_low),
+                _mm256_shuffle_ps::<0xee>(ab_low, cd_low),
+                _mm256_shuffle_ps::<0x44>(ab_high, cd_high),
+                _mm256_shuffle_ps::<0xee>(ab_high, cd_high),
+            ]
+        }
+    }
+
+    #[inline(always)]
     unsafe fn load_i(from: *const i32) -> Self::I {
         unsafe { _mm256_loadu_si256(from.cast()) }
     }
@@ -421,6 +479,10 @@ impl Simd for Avx2 {
         unsafe { [_mm256_loadu_pd(from), _mm256_loadu_pd(from.add(4))] }
     }
     #[inline(always)]
+    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
+        unsafe { [_mm256_loadu_pd(low), _mm256_loadu_pd(high)] }
+    }
+    #[inline(always)]
     unsafe fn store_d(to: *mut f64, value: Self::D) {
         unsafe {
             _mm256_storeu_pd(to, value[0]);
@@ -476,6 +538,24 @@ impl Simd for Avx2 {
             let no = each!(_mm256_andnot_pd, mask, no);
             each!(_mm256_or_pd, each!(_mm256_and_pd, mask, yes), no)
         }
+    }
+    #[inline(always)]
+    unsafe fn transpose_halves_d(rows: [Self::D; 4]) -> [Self::D; 4] {
+        let [a, b, c, d] = rows;
+        let mut columns = rows;
+        for half in 0..2 {
+            unsafe {
+                let ab_even = _mm256_unpacklo_pd(a[half], b[half]);
+                let cd_even = _mm256_unpacklo_pd(c[half], d[half]);
+                let ab_odd = _mm256_unpackhi_pd(a[half], b[half]);
+                let cd_odd = _mm256_unpackhi_pd(c[half], d[half]);
+                columns[0][half] = _mm256_permute2f128_pd::<0x20>(ab_even, cd_even);
+                columns[1][half] = _mm256_permute2f128_pd::<0x20>(ab_odd, cd_odd);
+                columns[2][half] = _mm256_permute2f128_pd::<0x31>(ab_even, cd_even);
+                columns[3][half] = _mm256_permute2f128_pd::<0x31>(ab_odd, cd_odd);
+            }
+        }
+        columns
     }
     #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {

@@ -4,11 +4,10 @@
 use std::ops::Range;
 
 use super::integrals::{Rings, reached, rows_of_rings};
-use super::methods::{CovarianceMatrix, MOMENTS, Sums};
+use super::methods::{CovarianceMatrix, MOMENTS};
 use super::rects::{Place, Rects};
 use crate::fast::Parts;
 use crate::fast::arithmetic::{Doubles, Floats};
-use crate::fast::tile::Bits;
 use crate::paper::{
     Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, Plane, inverse_depth, window,
 };
@@ -206,19 +205,11 @@ impl EvenTile<'_> {
         let (left, stride, rows) = (rings.left(), rings.stride(), rings.rows);
         let place = Place { image: [self.width, self.height], x, y, left, stride, rows };
         let (_, sums) = rings.parts();
-        let mut numbers = [[0.0; GROUP]; MOMENTS];
         // SAFETY: as the caller's.
         unsafe {
             let radii = Floats(S::load(radii.map(|radius| radius as f32).as_ptr()));
             let rects = Rects::new::<S>(&place, radii.0, false, false);
-            for lane in Bits(lanes) {
-                CovarianceMatrix::take(&mut numbers, lane, rects.sum(lane, sums), &rects, &[]);
-            }
-            let mut sums = [Doubles::<S>::splat(0.0); MOMENTS];
-            for i in 0..MOMENTS {
-                sums[i] = Doubles(S::load_d(numbers[i].as_ptr()));
-            }
-            let [sx, sy, sr, n, xx, xy, xr, yy, yr, rr] = sums;
+            let [sx, sy, sr, n, xx, yy, rr, _, xy, yr, xr, _] = rects.sums::<S, MOMENTS>(sums);
             let (mx, my, mr) = (sx / n, sy / n, sr / n);
             let (xx, xy, yy) = (xx - sx * mx, xy - sx * my, yy - sy * my);
             let (xr, yr, rr) = (xr - sx * mr, yr - sy * mr, rr - sr * mr);

@@ -4,17 +4,13 @@
 use super::integrals::{Channels, Counted};
 use super::rects::Rects;
 use crate::fast::arithmetic::{Doubles, Floats, cross, dot};
-use crate::fast::lanes::transpose4;
 use crate::fast::moments::{WindowMoments, plane};
-use crate::fast::tile::Found;
+use crate::fast::tile::{Bits, Found};
 use crate::paper::{CleanPoints, Rect};
 use crate::simd::{GROUP, Simd};
 
 /// A method's sums and normals.
 pub(crate) trait Sums<const N: usize>: Channels<N> {
-    /// What eight windows' normals are made from.
-    type Numbers: Default;
-
     /// Whether the method gives a curvature.
     const CURVATURE: bool;
 
@@ -24,39 +20,27 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
     /// Whether the ends of the window's middle row and column are wanted.
     const ENDS: bool;
 
-    /// Takes the sum of one window; `points` and `ends` are there if wanted.
-    fn take(
-        numbers: &mut Self::Numbers,
-        lane: usize,
-        sum: [f64; N],
-        rects: &Rects,
-        points: &[Counted],
-    );
-
     /// What the rounding errors of sums stay below, where the points have been summed to `total` over `count` pixels
     /// and no coordinate is above `largest`.
     fn error(total: [f64; N], count: usize, largest: f32) -> f64;
 
-    /// The normals; only of these `lanes` there are numbers, of the `fresh` ones from [`Sums::afresh`].
+    /// The normals from the sums over eight windows; only these `lanes` mean something, the `fresh` ones are from
+    /// [`Sums::afresh`].
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`.
+    /// The processor has the instruction set of `S`; the rectangles are of a ring that has these points.
     unsafe fn normals<S: Simd>(
-        numbers: &Self::Numbers,
+        sums: &[Doubles<S>; N],
         rects: &Rects,
+        points: &[Counted],
         error: f64,
         lanes: u32,
         fresh: u32,
     ) -> Found<S>;
 
-    /// Takes one window's sums from its points, without the rings' rounding; false if that is left to the plain form.
-    fn afresh(
-        _numbers: &mut Self::Numbers,
-        _lane: usize,
-        _points: &impl CleanPoints,
-        _rect: &Rect,
-    ) -> bool {
-        false
+    /// One window's sums from its points, without the rings' rounding; none if that is left to the plain form.
+    fn afresh(_points: &impl CleanPoints, _rect: &Rect) -> Option<[f64; N]> {
+        None
     }
 }
 
@@ -68,8 +52,8 @@ pub(crate) struct CovarianceMatrix {
     pub origin: [f32; 3],
 }
 
-/// First moments and the number of points, second moments.
-pub(crate) const MOMENTS: usize = 10;
+/// x, y, z, the number of points; xx, yy, zz, it again; xy, yz, zx, it again: fours, as sums are read.
+pub(crate) const MOMENTS: usize = 12;
 
 impl Channels<MOMENTS> for CovarianceMatrix {
     #[inline(always)]
@@ -80,64 +64,39 @@ impl Channels<MOMENTS> for CovarianceMatrix {
             p[c] = (f64::from(own[c]) - f64::from(self.origin[c])) * count;
         }
         let [x, y, z] = p;
-        [x, y, z, count, x * x, x * y, x * z, y * y, y * z, z * z]
+        [x, y, z, count, x * x, y * y, z * z, count, x * y, y * z, z * x, count]
     }
 }
 
 impl Sums<MOMENTS> for CovarianceMatrix {
-    type Numbers = [[f64; GROUP]; MOMENTS];
     const CURVATURE: bool = true;
     const INNER: bool = false;
     const ENDS: bool = false;
 
-    #[inline(always)]
-    fn take(
-        numbers: &mut Self::Numbers,
-        lane: usize,
-        sum: [f64; MOMENTS],
-        _: &Rects,
-        _: &[Counted],
-    ) {
-        for i in 0..MOMENTS {
-            numbers[i][lane] = sum[i];
-        }
-    }
-
     fn error(total: [f64; MOMENTS], _: usize, _: f32) -> f64 {
-        ROUNDING * (total[4] + total[7] + total[9])
+        ROUNDING * (total[4] + total[5] + total[6])
     }
 
     #[inline(always)]
     unsafe fn normals<S: Simd>(
-        numbers: &Self::Numbers,
+        sums: &[Doubles<S>; MOMENTS],
         _: &Rects,
+        _: &[Counted],
         error: f64,
         lanes: u32,
         fresh: u32,
     ) -> Found<S> {
-        // SAFETY: as the caller's; each number is there for a whole group.
-        unsafe {
-            let mut sums = [Doubles::<S>::splat(0.0); 9];
-            for (c, i) in [0, 1, 2, 4, 5, 6, 7, 8, 9].into_iter().enumerate() {
-                sums[c] = Doubles(S::load_d(numbers[i].as_ptr()));
-            }
-            let count = Doubles(S::load_d(numbers[3].as_ptr()));
-            plane(&WindowMoments { sums, count }, error, lanes, fresh)
-        }
+        let [x, y, z, count, xx, yy, zz, _, xy, yz, xz, _] = *sums;
+        let sums = [x, y, z, xx, xy, xz, yy, yz, zz];
+        // SAFETY: as the caller's.
+        unsafe { plane(&WindowMoments { sums, count }, error, lanes, fresh) }
     }
 
     #[cold]
-    fn afresh(
-        numbers: &mut Self::Numbers,
-        lane: usize,
-        points: &impl CleanPoints,
-        rect: &Rect,
-    ) -> bool {
+    fn afresh(points: &impl CleanPoints, rect: &Rect) -> Option<[f64; MOMENTS]> {
         let WindowMoments { sums, count } = WindowMoments::of(points.finite(rect));
         let [x, y, z, xx, xy, xz, yy, yz, zz] = sums;
-        let moments = [x, y, z, count, xx, xy, xz, yy, yz, zz];
-        Self::take(numbers, lane, moments, &Rects::default(), &[]);
-        true
+        Some([x, y, z, count, xx, yy, zz, count, xy, yz, xz, count])
     }
 }
 
@@ -158,23 +117,22 @@ fn error_of_differences(count: usize, largest: f32) -> f64 {
     2.0 * ROUNDING * f64::from(largest) * count as f64
 }
 
-/// Four numbers of eight windows, window by window.
-type Fours = [[f32; 4]; GROUP];
-
-/// The same number by number.
+/// The coordinates of eight points of `points`, and which of them are there.
 ///
 /// # Safety
-/// The processor has the instruction set of `S`.
+/// The processor has the instruction set of `S`; all of `places` are inside.
 #[inline(always)]
-pub(crate) unsafe fn by_number<S: Simd>(fours: &Fours) -> [Floats<S>; 4] {
-    let mut lanes = [[0.0; GROUP]; 4];
-    // SAFETY: as the caller's; four windows' numbers are four times four floats.
+pub(crate) unsafe fn gather<S: Simd>(points: &[Counted], places: &[i32; GROUP]) -> [Floats<S>; 4] {
+    let points = points.as_ptr();
+    // SAFETY: as the caller's; a point is half a group.
     unsafe {
-        let from = fours.as_ptr().cast::<f32>();
-        transpose4(from, 4, lanes.as_mut_ptr().cast(), GROUP);
-        transpose4(from.add(16), 4, lanes.as_mut_ptr().cast::<f32>().add(4), GROUP);
-        let load = |i: usize| Floats(S::load(lanes[i].as_ptr()));
-        [load(0), load(1), load(2), load(3)]
+        let mut rows = [S::splat(0.0); 4];
+        for i in 0..4 {
+            let (low, high) = (points.add(places[i] as usize), points.add(places[i + 4] as usize));
+            rows[i] = S::load_halves(low.cast(), high.cast());
+        }
+        let [x, y, z, count] = S::transpose_halves(rows);
+        [Floats(x), Floats(y), Floats(z), Floats(count)]
     }
 }
 
@@ -190,19 +148,9 @@ impl Channels<8> for Gradients {
 }
 
 impl Sums<8> for Gradients {
-    /// Horizontal and vertical gradients.
-    type Numbers = [Fours; 2];
     const CURVATURE: bool = false;
     const INNER: bool = true;
     const ENDS: bool = false;
-
-    #[inline(always)]
-    fn take(numbers: &mut [Fours; 2], lane: usize, sum: [f64; 8], _: &Rects, _: &[Counted]) {
-        for i in 0..4 {
-            numbers[0][lane][i] = sum[i] as f32;
-            numbers[1][lane][i] = sum[i + 4] as f32;
-        }
-    }
 
     fn error(_: [f64; 8], count: usize, largest: f32) -> f64 {
         error_of_differences(count, largest)
@@ -210,18 +158,18 @@ impl Sums<8> for Gradients {
 
     #[inline(always)]
     unsafe fn normals<S: Simd>(
-        numbers: &[Fours; 2],
+        sums: &[Doubles<S>; 8],
         _: &Rects,
+        _: &[Counted],
         error: f64,
         _: u32,
         _: u32,
     ) -> Found<S> {
+        let [hx, hy, hz, _, vx, vy, vz, _] = *sums;
+        let horizontal = [hx.narrow(), hy.narrow(), hz.narrow()];
+        let vertical = [vx.narrow(), vy.narrow(), vz.narrow()];
         // SAFETY: as the caller's.
-        unsafe {
-            let [hx, hy, hz, _] = by_number::<S>(&numbers[0]);
-            let [vx, vy, vz, _] = by_number::<S>(&numbers[1]);
-            across([hx, hy, hz], [vx, vy, vz], error)
-        }
+        unsafe { across(horizontal, vertical, error) }
     }
 }
 
@@ -239,34 +187,9 @@ impl Channels<4> for SmoothedDepthChanges {
 }
 
 impl Sums<4> for SmoothedDepthChanges {
-    /// Depth changes and their counts, the differences of the ends of the middle row, and of the middle column with,
-    /// instead of z, how far the ends are apart.
-    type Numbers = [Fours; 3];
     const CURVATURE: bool = false;
     const INNER: bool = true;
     const ENDS: bool = true;
-
-    #[inline(always)]
-    fn take(
-        numbers: &mut [Fours; 3],
-        lane: usize,
-        sum: [f64; 4],
-        rects: &Rects,
-        points: &[Counted],
-    ) {
-        for i in 0..4 {
-            numbers[0][lane][i] = sum[i] as f32;
-        }
-        for (line, to) in (0..2).zip(&mut numbers[1..]) {
-            let [from, end] = &rects.ends[line];
-            let (a, b) = (&points[from[lane] as usize], &points[end[lane] as usize]);
-            let both = a[3] * b[3];
-            to[lane] = [b[0] - a[0], b[1] - a[1], rects.spans[line][lane], both];
-            if both == 0.0 {
-                to[lane] = rects.outermost(line, lane, points);
-            }
-        }
-    }
 
     fn error(_: [f64; 4], count: usize, largest: f32) -> f64 {
         error_of_differences(count, largest)
@@ -274,25 +197,64 @@ impl Sums<4> for SmoothedDepthChanges {
 
     #[inline(always)]
     unsafe fn normals<S: Simd>(
-        numbers: &[Fours; 3],
-        _: &Rects,
+        sums: &[Doubles<S>; 4],
+        rects: &Rects,
+        points: &[Counted],
         error: f64,
-        _: u32,
+        lanes: u32,
         _: u32,
     ) -> Found<S> {
+        let [h, h_count, v, v_count] = *sums;
         // SAFETY: as the caller's.
         unsafe {
-            let [h, h_count, v, v_count] = by_number::<S>(&numbers[0]);
-            let [hx, hy, h_span, _] = by_number::<S>(&numbers[1]);
-            let [vx, vy, v_span, _] = by_number::<S>(&numbers[2]);
+            let [hx, hy, h_span] = outermost::<S>(rects, 0, points, lanes);
+            let [vx, vy, v_span] = outermost::<S>(rects, 1, points, lanes);
             // Times twice the number of depth changes, which are over two pixels each.
+            let (h_count, v_count) = (h_count.narrow(), v_count.narrow());
             let (h_count, v_count) = (h_count + h_count, v_count + v_count);
             across(
-                [hx * h_count, hy * h_count, h * h_span],
-                [vx * v_count, vy * v_count, v * v_span],
+                [hx * h_count, hy * h_count, h.narrow() * h_span],
+                [vx * v_count, vy * v_count, v.narrow() * v_span],
                 error,
             )
         }
+    }
+}
+
+/// The differences in x and y between the outermost points of eight windows' middle rows (`line` 0) or columns, and
+/// how far apart these are.
+///
+/// # Safety
+/// As [`Sums::normals`].
+#[inline(always)]
+unsafe fn outermost<S: Simd>(
+    rects: &Rects,
+    line: usize,
+    points: &[Counted],
+    lanes: u32,
+) -> [Floats<S>; 3] {
+    // SAFETY: as the caller's.
+    unsafe {
+        let [first, last] = &rects.ends[line];
+        let (a, b) = (gather::<S>(points, first), gather::<S>(points, last));
+        let span = Floats(S::load(rects.spans[line].as_ptr()));
+        let found = [b[0] - a[0], b[1] - a[1], span];
+        let missing = (a[3] * b[3]).lt(Floats::splat(1.0)) & lanes;
+        if missing == 0 {
+            return found;
+        }
+        let mut fields = [[0.0; GROUP]; 3];
+        for c in 0..3 {
+            S::store(fields[c].as_mut_ptr(), found[c].0);
+        }
+        for lane in Bits(missing) {
+            let one = rects.outermost(line, lane, points);
+            for c in 0..3 {
+                fields[c][lane] = one[c];
+            }
+        }
+        let load = |c: usize| Floats(S::load(fields[c].as_ptr()));
+        [load(0), load(1), load(2)]
     }
 }
 

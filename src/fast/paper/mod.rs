@@ -21,7 +21,7 @@ use windows::{Rows, Sweep, reach};
 
 use super::paths::{self, Task};
 use super::sink::Sink;
-use super::{Chunk, Parts, TILE_BYTES, TILE_ROWS, lock, reserve, share_out};
+use super::{Chunk, Parts, TILE_ROWS, lock, reserve, share_out};
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
@@ -31,6 +31,10 @@ use crate::simd::{GROUP, Simd};
 
 /// Elements of a tile's rings at most: floats hold their indices. Room for the largest windows there are.
 const MOST_INDICES: usize = 1 << 24;
+
+/// Bytes of a tile's rings. Eight windows' corners move along them from group to group, which needs no more than a few
+/// of the rows' cache lines at a time: narrow tiles cost more, in pixels around them that are summed twice.
+const RING_BYTES: usize = 4 << 20;
 
 /// Rows of the whole image: depths, and the radii of windows.
 #[derive(Debug, Default)]
@@ -158,7 +162,7 @@ impl Grid {
     /// Tiles for windows that reach `largest` from their pixels at most, in rings of so many bytes a column and row.
     fn new(width: usize, height: usize, largest: usize, column: usize) -> Self {
         let ring = rows_of_rings(largest, height);
-        let columns = (TILE_BYTES / (column * ring)).max(4 * largest);
+        let columns = (RING_BYTES / (column * ring)).max(4 * largest);
         let columns = columns.min(MOST_INDICES / ring - 2 * largest - 4 * GROUP);
         let across = width.div_ceil(columns.next_multiple_of(GROUP));
         let columns = width.div_ceil(across).next_multiple_of(GROUP);

@@ -1,6 +1,7 @@
 //! Where in a tile's rings eight windows lie (Eq. 3).
 
 use super::integrals::Counted;
+use crate::fast::arithmetic::Doubles;
 use crate::simd::{GROUP, Simd};
 
 type Indices = [i32; GROUP];
@@ -74,25 +75,40 @@ impl Rects {
         rects
     }
 
-    /// The sum over a window (Eq. 3, not divided).
+    /// The sums over the eight windows (Eq. 3, not divided), channel by channel.
     ///
     /// # Safety
-    /// The corners are indices of `sums`.
+    /// The processor has the instruction set of `S`; the corners are indices of `sums`.
     #[inline(always)]
-    pub unsafe fn sum<const N: usize>(&self, lane: usize, sums: &[[f64; N]]) -> [f64; N] {
-        // SAFETY: promised by the caller.
-        let at = |corner: usize| unsafe { sums.get_unchecked(self.corners[corner][lane] as usize) };
-        let [a, b, c, d] = [at(0), at(1), at(2), at(3)];
-        let mut sum = [0.0; N];
-        for i in 0..N {
-            sum[i] = (d[i] - c[i]) - (b[i] - a[i]);
+    pub unsafe fn sums<S: Simd, const N: usize>(&self, sums: &[[f64; N]]) -> [Doubles<S>; N] {
+        const { assert!(N.is_multiple_of(4)) };
+        // SAFETY: as the caller's; an element has fours of channels.
+        unsafe {
+            let mut channels = [Doubles::splat(0.0); N];
+            for first in (0..N).step_by(4) {
+                let at = |corner: &Indices, lane: usize| {
+                    let four = |lane: usize| {
+                        sums.as_ptr().add(corner[lane] as usize).cast::<f64>().add(first)
+                    };
+                    Doubles::<S>(S::load_halves_d(four(lane), four(lane + 4)))
+                };
+                let [a, b, c, d] = &self.corners;
+                let mut windows = [S::splat_d(0.0); 4];
+                for i in 0..4 {
+                    windows[i] = ((at(d, i) - at(c, i)) - (at(b, i) - at(a, i))).0;
+                }
+                let fours = S::transpose_halves_d(windows);
+                for i in 0..4 {
+                    channels[first + i] = Doubles(fours[i]);
+                }
+            }
+            channels
         }
-        sum
     }
 
     /// Where an end of a window's middle row (`line` 0) or column is missing: the differences in x and y between the
-    /// outermost points that are there, and how far they are apart; zeros if there are not two.
-    pub fn outermost(&self, line: usize, lane: usize, points: &[Counted]) -> [f32; 4] {
+    /// outermost points that are there, and how far apart these are; zeros if there are not two.
+    pub fn outermost(&self, line: usize, lane: usize, points: &[Counted]) -> [f32; 3] {
         let (step, count) = ([1, self.stride][line], self.spans[line][lane] as usize + 1);
         let length = self.stride * self.rows;
         let ends = self.ends[line];
@@ -106,10 +122,10 @@ impl Rects {
             (b, last) = (if b < step { b + length } else { b } - step, last - 1);
         }
         if first >= last {
-            return [0.0; 4];
+            return [0.0; 3];
         }
         let (a, b) = (&points[a], &points[b]);
-        [b[0] - a[0], b[1] - a[1], (last - first) as f32, 1.0]
+        [b[0] - a[0], b[1] - a[1], (last - first) as f32]
     }
 }
 

@@ -4,7 +4,7 @@
 use std::ops::Range;
 
 use super::integrals::{Rings, reached, rows_of_rings};
-use super::methods::{Sums, by_number};
+use super::methods::{Sums, gather};
 use super::rects::{Place, Rects};
 use crate::cloud::Points;
 use crate::fast::sink::Sink;
@@ -14,6 +14,9 @@ use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
 use crate::paper::{CleanPoints, Cleaned, Rect, plain_estimate, window};
 use crate::simd::{GROUP, Simd};
+
+/// The places of eight points in a row.
+const FIRST: [i32; GROUP] = [0, 1, 2, 3, 4, 5, 6, 7];
 
 /// A rectangle of the image whose normals are computed together.
 pub(crate) struct Tile<'a, F> {
@@ -105,21 +108,18 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                     continue;
                 }
                 let rects = Rects::new::<S>(&place, eight, M::INNER, M::ENDS);
-                let mut numbers = M::Numbers::default();
-                let mut todo = windows;
-                while todo != 0 {
-                    let lane = todo.trailing_zeros() as usize % GROUP;
-                    todo &= todo - 1;
-                    M::take(&mut numbers, lane, rects.sum(lane, sums), &rects, points);
-                }
+                let mut sums = rects.sums::<S, N>(sums);
                 let mut fresh = 0;
                 let found = loop {
-                    let found = M::normals::<S>(&numbers, &rects, error, windows, fresh);
+                    let found = M::normals(&sums, &rects, points, error, windows, fresh);
                     let mut tried = 0;
                     for lane in Bits(found.doubtful & windows & !fresh) {
-                        let rect = rect(x + lane);
-                        let taken = M::afresh(&mut numbers, lane, &cleaned, &rect);
-                        tried |= u32::from(taken) << lane;
+                        if let Some(one) = M::afresh(&cleaned, &rect(x + lane)) {
+                            for (sum, one) in sums.iter_mut().zip(one) {
+                                sum.0 = S::select_bits_d(1 << lane, S::splat_d(one), sum.0);
+                            }
+                            tried |= 1 << lane;
+                        }
                     }
                     if tried == 0 {
                         break found;
@@ -127,7 +127,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                     fresh |= tried;
                 };
                 let plain = found.doubtful & windows;
-                let [px, py, pz, _] = by_number::<S>(rings.eight(x, y));
+                let [px, py, pz, _] = gather::<S>(rings.eight(x, y), &FIRST);
                 let viewpoint = self.options.viewpoint;
                 let (sure, here) = (windows & !plain, [px, py, pz]);
                 let mut normals =
