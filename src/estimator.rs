@@ -9,7 +9,7 @@ use crate::isa::Isa;
 use crate::methods::{Estimate, covariance_matrix, estimate, estimate_window};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
-use crate::paper::{self, Asked, ChooseRow, Cloud, EvenWindow, PaperMaps, with_missing_as_nan};
+use crate::paper::{self, Asked, Cloud, EvenWindow, EvenWindows, PaperMaps, with_missing_as_nan};
 use crate::smoothing_area::window_side;
 use crate::window::Image;
 
@@ -372,24 +372,24 @@ impl paper::Engine for Engine<'_> {
         Ok((radii, estimates))
     }
 
-    fn even_windows(&mut self, cloud: &Cloud, asked: &Asked) -> Result<Vec<EvenWindow>, Error> {
+    fn even_windows(
+        &mut self,
+        cloud: &Cloud,
+        asked: &Asked,
+        needed: &[bool],
+    ) -> Result<Vec<EvenWindow>, Error> {
         if self.is_plain {
-            return Ok(paper::even_windows(cloud, asked));
+            return Ok(paper::even_windows(cloud, asked, needed));
         }
-        fast::paper::even_windows(self.isa, cloud, asked, self.options.threads, self.scratch)
+        let threads = self.options.threads;
+        fast::paper::even_windows(self.isa, cloud, asked, needed, threads, self.scratch)
     }
 
-    fn for_each_row(
-        &mut self,
-        choices: &mut [Option<usize>],
-        choose: &ChooseRow,
-    ) -> Result<(), Error> {
-        let width = self.points.width();
+    fn choices(&mut self, even: &EvenWindows) -> Result<Vec<Option<usize>>, Error> {
         if self.is_plain {
-            choices.chunks_mut(width).enumerate().for_each(|(y, row)| choose(y, row));
-            return Ok(());
+            return Ok(even.choices());
         }
-        fast::for_each_row(choices, width, self.options.threads, self.scratch, choose)
+        fast::paper::choices(self.isa, even, self.options.threads, self.scratch)
     }
 
     fn of_radii(&mut self, radii: &[u32]) -> Result<Vec<Estimate>, Error> {

@@ -193,23 +193,6 @@ fn share_out(height: usize, count: usize, reach: usize, chunks: &mut Vec<Chunk>)
     }));
 }
 
-/// Calls `work` with the number of every row and the row, on so many threads.
-pub(crate) fn for_each_row<T: Send>(
-    rows: &mut [T],
-    width: usize,
-    threads: usize,
-    scratch: &mut Scratch,
-    work: impl Fn(usize, &mut [T]) + Sync,
-) -> Result<(), Error> {
-    scratch.workers.prepare(threads)?;
-    let parts = Parts(rows.as_mut_ptr());
-    scratch.workers.for_each(rows.len() / width, |_, y| {
-        // SAFETY: rows do not overlap.
-        work(y, unsafe { parts.part(y * width..(y + 1) * width) });
-    });
-    Ok(())
-}
-
 /// Lends every item of a slice to one worker at a time.
 struct Parts<T>(*mut T);
 

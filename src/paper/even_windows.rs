@@ -9,6 +9,7 @@
 use super::cloud::Cloud;
 use super::planes::{JITTER, Plane, inverse_depth};
 use super::rect::Rect;
+use crate::options::Options;
 
 /// Inverse depths that deviate less than this many alpha from a plane are as good as in it.
 const EVEN: f32 = 0.02;
@@ -17,11 +18,11 @@ const EVEN: f32 = 0.02;
 /// taken to be as far above the least one of all windows that a pixel can take.
 pub(crate) const CHANCE: f32 = 3.0;
 /// What the part of a window's variance that is not noise counts.
-const MISFIT: f32 = 3.0;
+pub(crate) const MISFIT: f32 = 3.0;
 /// What the squared distance of the points next to the pixel from the window's plane counts, where it is more than
 /// `NEAR_NOISE` variances of their mean.
-const NEAR: f32 = 9.0;
-const NEAR_NOISE: f32 = 4.0;
+pub(crate) const NEAR: f32 = 9.0;
+pub(crate) const NEAR_NOISE: f32 = 4.0;
 /// On steep surfaces the sensor's noise along the rows and columns looks like depth changes. A window with some is
 /// still on one surface if its points deviate from the plane by less than the plane changes in this many pixels:
 /// across a true change it would be side / 6 pixels, so the window must have at least `JAGGED_RADIUS` and
@@ -30,13 +31,14 @@ pub(crate) const JAGGED: f64 = 1.4;
 pub(crate) const JAGGED_RADIUS: u32 = 2;
 pub(crate) const JAGGED_POINTS: f64 = 0.8;
 /// How many pixels beyond its window's edge a plane may be taken for a pixel's: outlines are ragged.
-const REACH: u32 = 3;
+pub(crate) const REACH: f32 = 3.0;
 
 /// A pixel's even window, and what it is worth.
 #[derive(Clone, Copy, Default)]
+#[repr(C)] // Eight floats, which the fast form reads as such.
 pub(crate) struct EvenWindow {
-    /// 0 for no window.
-    pub radius: u32,
+    /// A whole number; 0 for no window.
+    pub radius: f32,
     /// The plane's inverse depth at the pixel, and its change per pixel to the right and down.
     pub inverse_depth: f32,
     pub slope: [f32; 2],
@@ -52,8 +54,9 @@ pub(crate) struct EvenWindow {
 pub(crate) struct Asked<'a> {
     /// The radius that the depth asks for, at most `limit`; 0 at a missing point.
     pub wanted: &'a [u32],
-    /// Whether some pixel may take the window.
-    pub needed: &'a [bool],
+    /// From how many radii the windows come that the pixel can take, starting with the largest and halving it; 0 for a
+    /// pixel that takes none.
+    pub levels: &'a [u8],
     /// The largest radius of a window without a depth change.
     pub clean: &'a [u32],
     /// The largest radius of all.
@@ -68,6 +71,24 @@ impl Asked<'_> {
         largest_radius(self.wanted[at], self.limit)
     }
 
+    /// The radii of the windows around the pixel that it can take.
+    pub fn radii(&self, at: usize) -> impl Iterator<Item = u32> + use<> {
+        let (largest, levels) = (self.largest(at), u32::from(self.levels[at]));
+        (0..levels).map(move |level| largest >> level).take_while(|radius| *radius > 0)
+    }
+
+    /// Whether some pixel can take a pixel's window, row by row.
+    pub fn needed(&self, width: usize, height: usize) -> Vec<bool> {
+        let mut needed = vec![false; width * height];
+        for at in (0..width * height).filter(|at| self.levels[*at] > 0) {
+            let pixel = (at % width, at / width);
+            for_each_place(pixel, (width, height), self.radii(at), |dx, dy| {
+                needed[at.wrapping_add_signed(dy * width as isize + dx)] = true;
+            });
+        }
+        needed
+    }
+
     /// The variance told from none where the sensor's smallest depth change is `alpha`.
     pub fn least_noise(alpha: f32) -> f32 {
         (EVEN * alpha).powi(2)
@@ -76,21 +97,21 @@ impl Asked<'_> {
 
 /// The largest radius of an even window where the depth asks for another one: twice that, since whether a pixel is on
 /// one side of a crease or on the other is told from less noise then.
-pub(crate) fn largest_radius(wanted: u32, limit: u32) -> u32 {
+fn largest_radius(wanted: u32, limit: u32) -> u32 {
     (2 * wanted).min(limit)
 }
 
 /// The even windows of the needed pixels, row by row: the plain form.
-pub(crate) fn even_windows(cloud: &Cloud, asked: &Asked) -> Vec<EvenWindow> {
+pub(crate) fn even_windows(cloud: &Cloud, asked: &Asked, needed: &[bool]) -> Vec<EvenWindow> {
     let pixels = (0..cloud.height).flat_map(|y| (0..cloud.width).map(move |x| (x, y)));
-    pixels.map(|pixel| even_window(cloud, asked, pixel).unwrap_or_default()).collect()
+    let window = |(pixel, needed): (_, &bool)| {
+        needed.then(|| even_window(cloud, asked, pixel)).flatten().unwrap_or_default()
+    };
+    pixels.zip(needed).map(window).collect()
 }
 
 fn even_window(cloud: &Cloud, asked: &Asked, pixel: (usize, usize)) -> Option<EvenWindow> {
     let at = cloud.index(pixel.0, pixel.1);
-    if !asked.needed[at] {
-        return None;
-    }
     let (wanted, clean) = (asked.wanted[at], asked.clean[at]);
     let rect = |radius: u32| Rect::around(pixel, radius as usize, (cloud.width, cloud.height));
     let plane = |radius: u32| Plane::of(cloud, &rect(radius));
@@ -130,16 +151,18 @@ fn even_window(cloud: &Cloud, asked: &Asked, pixel: (usize, usize)) -> Option<Ev
 impl EvenWindow {
     /// A window of a radius with so many points.
     pub fn worth(radius: u32, points: f32) -> Self {
-        let side = (2 * radius + 1) as f32;
+        let radius = radius as f32;
+        let side = 2.0 * radius + 1.0;
         let per_bend = 1.0 / (side * side);
         EvenWindow { radius, per_noise: 12.0 / points * per_bend, per_bend, ..Self::default() }
     }
 }
 
-/// The even windows of all pixels, to choose from.
+/// The even windows that are needed, to choose from.
 pub(crate) struct EvenWindows<'a> {
     pub cloud: &'a Cloud,
     pub asked: &'a Asked<'a>,
+    pub options: &'a Options,
     /// Row by row.
     pub windows: Vec<EvenWindow>,
 }
@@ -147,45 +170,42 @@ pub(crate) struct EvenWindows<'a> {
 impl EvenWindows<'_> {
     /// The radius of a pixel's window; 0 for none.
     pub fn radius(&self, at: usize) -> u32 {
-        self.windows[at].radius
+        self.windows[at].radius as u32
     }
 
-    /// The pixel whose window is worth most to `pixel`, among itself and those at the places of windows of these
-    /// radii; none if there is none. Windows that end short of the pixel are taken if its point, or in inverse depth
-    /// one within `tolerance` of it, lies in their plane. `found` is scratch memory.
-    pub fn best(
-        &self,
-        pixel: (usize, usize),
-        radii: impl Iterator<Item = u32>,
-        tolerance: f32,
-        found: &mut Vec<Candidate>,
-    ) -> Option<usize> {
+    /// The pixel whose window each pixel takes, if there is one: the plain form.
+    pub fn choices(&self) -> Vec<Option<usize>> {
+        let choice = |at: usize| (self.asked.levels[at] > 0).then(|| self.best(at)).flatten();
+        (0..self.windows.len()).map(choice).collect()
+    }
+
+    /// The pixel whose window is worth most to a pixel, among itself and those at the places of the windows that it
+    /// can take; none if there is none. Windows that end short of the pixel are taken if its point, or in inverse depth
+    /// one within the tolerance of it, lies in their plane.
+    fn best(&self, own: usize) -> Option<usize> {
         let cloud = self.cloud;
+        let pixel = (own % cloud.width, own / cloud.width);
         let mut noise = f32::INFINITY;
-        found.clear();
-        let own = cloud.index(pixel.0, pixel.1);
-        for_each_place(pixel, (cloud.width, cloud.height), radii, |dx, dy| {
+        let mut found = Vec::new();
+        for_each_place(pixel, (cloud.width, cloud.height), self.asked.radii(own), |dx, dy| {
             let at = own.wrapping_add_signed(dy * cloud.width as isize + dx);
             let window = &self.windows[at];
-            let distance = dx.unsigned_abs().max(dy.unsigned_abs()) as u32;
-            if window.radius > 0 && distance <= window.radius + REACH {
+            let distance = dx.unsigned_abs().max(dy.unsigned_abs()) as f32;
+            if window.radius > 0.0 && distance <= window.radius + REACH {
                 noise = noise.min(window.noise);
-                let short = distance.saturating_sub(window.radius);
+                let short = (distance - window.radius).max(0.0);
                 found.push(Candidate { at, to_pixel: [-dx as f32, -dy as f32], short });
             }
         });
 
         let noise = noise.max(self.asked.least_noise);
         let near = self.near(pixel);
-        let point = inverse_depth(cloud.depths[own]);
+        let (point, tolerance) = (inverse_depth(cloud.depths[own]), self.tolerance(own));
         let mut best: Option<(f32, usize)> = None;
-        for &Candidate { at, to_pixel: [dx, dy], short } in found.iter() {
+        for Candidate { at, to_pixel: [dx, dy], short } in found {
             let window = &self.windows[at];
             let least = best.map_or(f32::INFINITY, |(least, _)| least);
-            let far = (1 + short * short) as f32;
-            if noise * window.per_noise * far >= least {
-                continue;
-            }
+            let far = 1.0 + short * short;
             let at_pixel = |x: f32, y: f32| {
                 window.inverse_depth + window.slope[0] * (dx + x) + window.slope[1] * (dy + y)
             };
@@ -196,12 +216,18 @@ impl EvenWindows<'_> {
             let cost = (noise * window.per_noise + bend * window.per_bend) * far;
             let [across, down] = window.slope;
             let steepness = || (across * across + down * down).sqrt();
-            let lies_in = || (point - at_pixel(0.0, 0.0)).abs() <= tolerance + JITTER * steepness();
-            if cost < least && (short == 0 || lies_in()) {
+            let lies_in = || (point - at_pixel(0.0, 0.0)).abs() < tolerance + JITTER * steepness();
+            if cost < least && (short == 0.0 || lies_in()) {
                 best = Some((cost, at));
             }
         }
         best.map(|(_, at)| at)
+    }
+
+    /// How far from a plane a pixel's point may lie to be on that surface, in inverse depth: half a depth change.
+    pub fn tolerance(&self, at: usize) -> f32 {
+        let depth = self.cloud.depths[at];
+        super::least_depth_change(depth, self.options) / (depth * depth) / 2.0
     }
 
     /// The mean of the pixel and those next to it, but of the pixel alone if there is a depth change among them.
@@ -226,8 +252,7 @@ impl EvenWindows<'_> {
 
 /// Calls `visit` with the ways in columns and rows from a pixel to those whose windows it can take: itself, and those at
 /// the places of windows of these radii.
-#[inline(always)]
-pub(crate) fn for_each_place(
+fn for_each_place(
     (x, y): (usize, usize),
     (width, height): (usize, usize),
     radii: impl Iterator<Item = u32>,
@@ -253,11 +278,11 @@ pub(crate) fn for_each_place(
 }
 
 /// A window that a pixel can take: that of the pixel `at`, from which `to_pixel` leads to this one.
-pub(crate) struct Candidate {
+struct Candidate {
     at: usize,
     to_pixel: [f32; 2],
     /// How many pixels the window ends short of this one.
-    short: u32,
+    short: f32,
 }
 
 /// The mean inverse depth of points next to a pixel, their number, and the mean of their places from there.

@@ -18,16 +18,16 @@ mod surroundings;
 
 pub(crate) use cloud::{CleanPoints, Cleaned, Cloud};
 pub(crate) use even_windows::{
-    Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, even_windows,
+    Asked, CHANCE, EvenWindow, EvenWindows, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, MISFIT, NEAR,
+    NEAR_NOISE, REACH, even_windows,
 };
 pub(crate) use methods::estimate as plain_estimate;
-pub(crate) use planes::{Plane, inverse_depth};
+pub(crate) use planes::{JITTER, Plane, inverse_depth};
 pub(crate) use rect::Rect;
 pub(crate) use smoothing_area::window;
 
 use creases::SummedNormals;
 use depth_change::DepthChanges;
-use even_windows::{EvenWindows, for_each_place};
 
 use crate::Error;
 use crate::cloud::Points;
@@ -125,8 +125,15 @@ fn is_depth_change(depth: f32, difference: f32, gap: usize, options: &Options) -
     }
 }
 
-/// Chooses for every pixel of a row another one, or none.
-pub(crate) type ChooseRow<'a> = dyn Fn(usize, &mut [Option<usize>]) + Sync + 'a;
+/// The difference in depth between neighbours that is a depth change.
+fn least_depth_change(depth: f32, options: &Options) -> f32 {
+    match options.semantics {
+        Semantics::Paper => {
+            options.paper.gamma * smoothing_area::smallest_depth_change(depth, &options.paper)
+        }
+        Semantics::Pcl => crate::depth_change::threshold(depth, options.max_depth_change_factor),
+    }
+}
 
 /// How windows and their estimates are computed: by the plain forms, or fast. Estimates are turned to the viewpoint.
 pub(crate) trait Engine {
@@ -134,14 +141,15 @@ pub(crate) trait Engine {
     fn windows(&mut self) -> Result<(Vec<u32>, Vec<Estimate>), Error>;
 
     /// The even windows of the needed pixels.
-    fn even_windows(&mut self, cloud: &Cloud, asked: &Asked) -> Result<Vec<EvenWindow>, Error>;
-
-    /// Calls `choose` with every row, and its number.
-    fn for_each_row(
+    fn even_windows(
         &mut self,
-        choices: &mut [Option<usize>],
-        choose: &ChooseRow,
-    ) -> Result<(), Error>;
+        cloud: &Cloud,
+        asked: &Asked,
+        needed: &[bool],
+    ) -> Result<Vec<EvenWindow>, Error>;
+
+    /// The pixel whose window each pixel takes, if there is one.
+    fn choices(&mut self, even: &EvenWindows) -> Result<Vec<Option<usize>>, Error>;
 
     /// The estimates of other windows, for the pixels that have one, by their radii.
     fn of_radii(&mut self, radii: &[u32]) -> Result<Vec<Estimate>, Error>;
@@ -216,7 +224,7 @@ pub(crate) fn estimates(
     let radius = |size: &u32| radius_of_size(*size, options).min(limit);
     let wanted_radii: Vec<u32> = wanted.iter().map(radius).collect();
     let normals = options.crease_windows.then(|| SummedNormals::new(&estimates, width, height));
-    // Of how many radii a pixel tries other pixels' windows: none unless one may serve it better than its own.
+    // None unless another pixel's window may serve better than its own.
     let levels = |at: usize| {
         let is_near_crease = || {
             sizes[at] > 0
@@ -233,44 +241,22 @@ pub(crate) fn estimates(
         }
     };
     let levels: Vec<u8> = (0..width * height).map(levels).collect();
-    let radii = |at: usize| {
-        let largest = even_windows::largest_radius(wanted_radii[at], limit);
-        (0..u32::from(levels[at])).map(move |level| largest >> level).take_while(|r| *r > 0)
-    };
-    let concerned = || pixels().filter(|(at, _)| levels[*at] > 0);
-    let mut needed = vec![false; width * height];
-    for (at, pixel) in concerned() {
-        for_each_place(pixel, (width, height), radii(at), |dx, dy| {
-            needed[at.wrapping_add_signed(dy * width as isize + dx)] = true;
-        });
-    }
     let asked = Asked {
         wanted: &wanted_radii,
-        needed: &needed,
+        levels: &levels,
         clean: &clean,
         limit,
         least_noise: Asked::least_noise(options.paper.alpha),
     };
-    let windows = engine.even_windows(&cloud, &asked)?;
-    let even = EvenWindows { cloud: &cloud, asked: &asked, windows };
-    // The pixel whose window a pixel takes, if there is one.
-    let mut choices = vec![None; width * height];
-    engine.for_each_row(&mut choices, &|y, row| {
-        let mut found = Vec::new();
-        for (x, to) in row.iter_mut().enumerate() {
-            let at = y * width + x;
-            if levels[at] > 0 {
-                let tolerance = tolerance(cloud.depths[at], options);
-                *to = even.best((x, y), radii(at), tolerance, &mut found);
-            }
-        }
-    })?;
+    let windows = engine.even_windows(&cloud, &asked, &asked.needed(width, height))?;
+    let even = EvenWindows { cloud: &cloud, asked: &asked, options, windows };
+    let choices = engine.choices(&even)?;
     let mut taken = vec![0; width * height];
     for other in choices.iter().flatten() {
         taken[*other] = even.radius(*other);
     }
     let second = engine.of_radii(&taken)?;
-    for (at, pixel) in concerned() {
+    for (at, pixel) in pixels().filter(|(at, _)| levels[*at] > 0) {
         let found =
             choices[at].map(|other| second[other]).filter(|found| !found.normal[0].is_nan());
         let around = || {
@@ -296,14 +282,3 @@ const EVERY_LEVEL: u8 = u32::BITS as u8;
 
 /// A crease does not bound the windows next to it as a depth change does: of the sizes that are tried, these many.
 const CREASE_LEVELS: u8 = 2;
-
-/// How far from a plane a point at a depth may lie to be on that surface, in inverse depth: half a depth change.
-fn tolerance(depth: f32, options: &Options) -> f32 {
-    let change = match options.semantics {
-        Semantics::Paper => {
-            options.paper.gamma * smoothing_area::smallest_depth_change(depth, &options.paper)
-        }
-        Semantics::Pcl => crate::depth_change::threshold(depth, options.max_depth_change_factor),
-    };
-    change / (depth * depth) / 2.0
-}

@@ -18,6 +18,7 @@ pub(super) struct EvenTile<'a> {
     /// Row by row, as `asked` is.
     pub depths: &'a [f32],
     pub asked: &'a Asked<'a>,
+    pub needed: &'a [bool],
     pub width: usize,
     pub height: usize,
     pub columns: Range<usize>,
@@ -142,7 +143,7 @@ impl EvenTile<'_> {
         let first = pixel.1 * self.width + pixel.0;
         let (mut wanted, mut clean, mut largest) = ([0; GROUP], [0; GROUP], [0; GROUP]);
         for lane in 0..count {
-            if !self.asked.needed[first + lane] {
+            if !self.needed[first + lane] {
                 continue;
             }
             wanted[lane] = self.asked.wanted[first + lane];

@@ -1,6 +1,7 @@
 //! The paper's windows and methods, fast: depths (`depths`), the radii of the windows of the whole image (`windows`),
 //! then tile by tile integral images of the method's channels (`integrals`, `methods`) and the normals (`tile`).
 
+mod choices;
 mod depths;
 mod even_windows;
 mod integrals;
@@ -26,7 +27,7 @@ use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::options::{DistanceMetric, Method, Options};
-use crate::paper::{Asked, Cloud, EvenWindow, PaperMaps};
+use crate::paper::{Asked, Cloud, EvenWindow, EvenWindows, PaperMaps};
 use crate::simd::{GROUP, Simd};
 
 /// Elements of a tile's rings at most: floats hold their indices. Room for the largest windows there are.
@@ -126,6 +127,7 @@ pub(crate) fn even_windows(
     isa: Isa,
     cloud: &Cloud,
     asked: &Asked,
+    needed: &[bool],
     threads: usize,
     scratch: &mut super::Scratch,
 ) -> Result<Vec<EvenWindow>, Error> {
@@ -139,12 +141,32 @@ pub(crate) fn even_windows(
     let grid = Grid::new(width, height, largest, Rings::<MOMENTS>::COLUMN);
     workers.for_each(grid.count(), |worker, item| {
         let Some((columns, rows)) = grid.tile(item) else { return };
-        let tile = EvenTile { depths, asked, width, height, columns, rows, largest };
+        let tile = EvenTile { depths, asked, needed, width, height, columns, rows, largest };
         let rings = &mut lock(&each[worker]).paper.moments;
         // SAFETY: the processor has the instruction set, and tiles do not share pixels.
         unsafe { paths::run(isa, EvenTask { tile: &tile, rings, image: &image }) };
     });
     Ok(windows)
+}
+
+/// The pixel whose even window each pixel takes, if there is one.
+pub(crate) fn choices(
+    isa: Isa,
+    even: &EvenWindows,
+    threads: usize,
+    scratch: &mut super::Scratch,
+) -> Result<Vec<Option<usize>>, Error> {
+    scratch.prepare(threads)?;
+    let &Cloud { width, height, .. } = even.cloud;
+    let mut choices = vec![None; width * height];
+    let parts = Parts(choices.as_mut_ptr());
+    scratch.workers.for_each(height, |_, y| {
+        // SAFETY: rows do not overlap.
+        let row = unsafe { parts.part(y * width..(y + 1) * width) };
+        // SAFETY: the processor has the instruction set.
+        unsafe { paths::run(isa, ChoicesTask { even, y, row }) };
+    });
+    Ok(choices)
 }
 
 /// The image in tiles of like sizes, whose rings stay in the cache.
@@ -398,5 +420,22 @@ impl Task for EvenTask<'_, '_> {
     unsafe fn run<S: Simd>(self) {
         // SAFETY: as the caller's.
         unsafe { self.tile.compute::<S>(self.rings, self.image) };
+    }
+}
+
+/// The choices of one row's pixels.
+struct ChoicesTask<'a> {
+    even: &'a EvenWindows<'a>,
+    y: usize,
+    row: &'a mut [Option<usize>],
+}
+
+impl Task for ChoicesTask<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Simd>(self) {
+        // SAFETY: as the caller's.
+        unsafe { choices::row::<S>(self.even, self.y, self.row) };
     }
 }
