@@ -87,24 +87,31 @@ pub(crate) fn least_steps(
     diagonal: u32,
 ) -> Vec<u32> {
     let mut map: Vec<u32> = starts.iter().map(|&start| if start { 0 } else { FAR }).collect();
-    let relax = |map: &mut [u32], x: usize, y: usize, backward: bool| {
-        let step = |dx: isize, dy: isize, weight: u32, map: &[u32]| {
-            let sign = if backward { -1 } else { 1 };
-            let nx = x.checked_add_signed(sign * dx).filter(|nx| *nx < width);
-            let ny = y.checked_add_signed(sign * dy).filter(|ny| *ny < height);
-            nx.zip(ny).map_or(FAR, |(nx, ny)| map[ny * width + nx] + weight)
-        };
-        let nearest = step(-1, 0, straight, map)
-            .min(step(0, -1, straight, map))
-            .min(step(-1, -1, diagonal, map))
-            .min(step(1, -1, diagonal, map));
-        map[y * width + x] = map[y * width + x].min(nearest);
+    let step = |to: &mut u32, from: u32, weight: u32| *to = (*to).min(from + weight);
+    let from_next_row = |row: &mut [u32], next: &[u32]| {
+        row.iter_mut().zip(next).for_each(|(to, from)| step(to, *from, straight));
+        row[1..].iter_mut().zip(next).for_each(|(to, from)| step(to, *from, diagonal));
+        row.iter_mut().zip(&next[1..]).for_each(|(to, from)| step(to, *from, diagonal));
     };
-    for at in 0..width * height {
-        relax(&mut map, at % width, at / width, false);
+    for y in 0..height {
+        let (above, row) = map[..(y + 1) * width].split_at_mut(y * width);
+        if y > 0 {
+            from_next_row(row, &above[(y - 1) * width..]);
+        }
+        for x in 1..width {
+            let from = row[x - 1];
+            step(&mut row[x], from, straight);
+        }
     }
-    for at in (0..width * height).rev() {
-        relax(&mut map, at % width, at / width, true);
+    for y in (0..height).rev() {
+        let (row, below) = map[y * width..].split_at_mut(width);
+        if y + 1 < height {
+            from_next_row(row, &below[..width]);
+        }
+        for x in (1..width).rev() {
+            let from = row[x];
+            step(&mut row[x - 1], from, straight);
+        }
     }
     map
 }

@@ -14,12 +14,13 @@ impl<const N: usize> SummedArea<N> {
         let stride = width + 1;
         let mut sums = vec![[0.0; N]; stride * (height + 1)];
         for y in 0..height {
-            let mut row = [0.0; N];
-            for x in 0..width {
+            let (above, row) = sums[y * stride..].split_at_mut(stride);
+            let mut along = [0.0; N];
+            for (x, (to, above)) in row[1..stride].iter_mut().zip(&above[1..]).enumerate() {
                 let value = value(y * width + x);
                 for i in 0..N {
-                    row[i] += value[i];
-                    sums[(y + 1) * stride + x + 1][i] = sums[y * stride + x + 1][i] + row[i];
+                    along[i] += value[i];
+                    to[i] = above[i] + along[i];
                 }
             }
         }
