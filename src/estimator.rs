@@ -9,7 +9,9 @@ use crate::isa::Isa;
 use crate::methods::{Estimate, covariance_matrix, estimate, estimate_window};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
-use crate::paper::{self, Asked, Cloud, EvenWindow, EvenWindows, PaperMaps, with_missing_as_nan};
+use crate::paper::{
+    self, Asked, Cloud, EvenWindow, EvenWindows, PaperMaps, SecondPass, with_missing_as_nan,
+};
 use crate::smoothing_area::window_side;
 use crate::window::Image;
 
@@ -42,6 +44,8 @@ pub struct Estimator {
     options: Options,
     isa: Isa,
     scratch: Scratch,
+    cloud: Cloud,
+    second_pass: SecondPass,
 }
 
 impl Estimator {
@@ -53,7 +57,8 @@ impl Estimator {
     /// An estimator that computes with this instruction set, or with the active one if the processor lacks it.
     pub fn with_isa(options: Options, isa: Isa) -> Self {
         let isa = if isa.is_available() { isa } else { Isa::active() };
-        Estimator { options, isa, scratch: Scratch::default() }
+        let (scratch, cloud) = (Scratch::default(), Cloud::default());
+        Estimator { options, isa, scratch, cloud, second_pass: SecondPass::default() }
     }
 
     /// The instruction set that computes.
@@ -148,7 +153,7 @@ impl Estimator {
         };
         if self.options.is_beyond_pcl() {
             let estimates = self.estimates(points)?;
-            write(&|pixel| estimates[pixel]);
+            write(&|pixel| estimates[pixel].into());
         } else {
             let plain = Plain::new(points, &self.options);
             write(&|pixel| plain.estimate(pixel % width, pixel / width));
@@ -273,27 +278,28 @@ impl Estimator {
     }
 
     /// All pixels' estimates where PCL's windows and sums alone are not what is asked for.
-    fn estimates(&mut self, points: &Points) -> Result<Vec<Estimate>, Error> {
+    fn estimates(&mut self, points: &Points) -> Result<&[[f32; 4]], Error> {
         let is_plain = self.is_plain(points);
-        let Estimator { options, isa, scratch } = self;
+        let Estimator { options, isa, scratch, cloud, second_pass } = self;
+        cloud.read(points, options);
         // To PCL's windows, a point that misses a coordinate is missing whole.
         let is_pcl = options.semantics == Semantics::Pcl;
-        let cleaned = is_pcl.then(|| with_missing_as_nan(points, options));
-        let (width, height) = (points.width(), points.height());
-        let cleaned = cleaned.as_ref().map(|cleaned| packed(cleaned, width, height));
+        let cleaned = is_pcl.then(|| packed(&cloud.points, cloud.width, cloud.height));
         let points = cleaned.as_ref().unwrap_or(points);
         let mut engine = Engine { points, options, isa: *isa, scratch, is_plain };
-        paper::estimates(points, options, &mut engine)
+        second_pass.estimates(cloud, options, &mut engine)
     }
 
     /// How much scratch memory is held, in bytes.
     pub fn scratch_size(&self) -> usize {
-        self.scratch.size()
+        self.scratch.size() + self.cloud.size() + self.second_pass.size()
     }
 
     /// Frees the scratch memory and the worker threads; the next computation makes them anew.
     pub fn release_scratch(&mut self) {
         self.scratch = Scratch::default();
+        self.cloud = Cloud::default();
+        self.second_pass = SecondPass::default();
     }
 }
 
@@ -316,18 +322,22 @@ impl Engine<'_> {
     /// The estimates that `compute` writes.
     fn written(
         &mut self,
+        estimates: &mut Vec<[f32; 4]>,
         compute: impl FnOnce(Isa, &Points, &Options, &Normals, &mut Scratch) -> Result<(), Error>,
-    ) -> Result<Vec<Estimate>, Error> {
+    ) -> Result<(), Error> {
         let (width, height) = (self.points.width(), self.points.height());
-        let mut found = vec![[f32::NAN; 4]; width * height];
-        let normals = Normals::interleaved(found.as_flattened_mut(), width, height, 4, 0, Some(3))?;
-        compute(self.isa, self.points, self.options, &normals, self.scratch)?;
-        let estimate = |[x, y, z, curvature]: [f32; 4]| Estimate { normal: [x, y, z], curvature };
-        Ok(found.into_iter().map(estimate).collect())
+        estimates.resize(width * height, Estimate::NONE.into());
+        let estimates = estimates.as_flattened_mut();
+        let normals = Normals::interleaved(estimates, width, height, 4, 0, Some(3))?;
+        compute(self.isa, self.points, self.options, &normals, self.scratch)
     }
 
     /// The plain form's estimates of the pixels that have a window.
-    fn plain(&self, estimate: impl Fn((usize, usize)) -> Option<Estimate>) -> Vec<Estimate> {
+    fn plain(
+        &self,
+        estimates: &mut Vec<[f32; 4]>,
+        estimate: impl Fn((usize, usize)) -> Option<Estimate>,
+    ) {
         let (width, height) = (self.points.width(), self.points.height());
         let turned = |at: usize| {
             let (x, y) = (at % width, at / width);
@@ -337,39 +347,38 @@ impl Engine<'_> {
                 Estimate { normal, ..found }
             })
         };
-        (0..width * height).map(turned).collect()
+        estimates.clear();
+        estimates.extend((0..width * height).map(|at| <[f32; 4]>::from(turned(at))));
     }
 }
 
 impl paper::Engine for Engine<'_> {
-    fn windows(&mut self) -> Result<(Vec<u32>, Vec<Estimate>), Error> {
+    fn windows(
+        &mut self,
+        sizes: &mut Vec<u32>,
+        estimates: &mut Vec<[f32; 4]>,
+    ) -> Result<(), Error> {
+        sizes.clear();
         let (width, height) = (self.points.width(), self.points.height());
         if self.options.semantics == Semantics::Pcl {
+            if !self.is_plain {
+                return self.written(estimates, |isa, points, options, normals, scratch| {
+                    fast::compute_with_sides(isa, points, options, normals, sizes, scratch)
+                });
+            }
             let plain = Plain::new(self.points, self.options);
-            let sides = (0..width * height).map(|at| plain.window_side(at % width, at / width));
-            let sides = sides.collect();
-            let estimates = if self.is_plain {
-                self.plain(|(x, y)| Some(plain.estimate(x, y)))
-            } else {
-                self.written(|isa, points, options, normals, scratch| {
-                    fast::compute(isa, points, options, None, normals, scratch)
-                })?
-            };
-            return Ok((sides, estimates));
+            sizes.extend((0..width * height).map(|at| plain.window_side(at % width, at / width)));
+            self.plain(estimates, |(x, y)| Some(plain.estimate(x, y)));
+            return Ok(());
         }
         if self.is_plain {
             let maps = PaperMaps::new(self.points, self.options);
-            let radii: Vec<u32> =
-                maps.smoothing_radii.iter().map(|radius| *radius as u32).collect();
-            let estimates = self.of_radii(&radii)?;
-            return Ok((radii, estimates));
+            sizes.extend(maps.smoothing_radii.iter().map(|radius| *radius as u32));
+            return self.of_radii(sizes, estimates);
         }
-        let mut radii = Vec::new();
-        let estimates = self.written(|isa, points, options, normals, scratch| {
-            radii = fast::paper::compute_with_radii(isa, points, options, normals, scratch)?;
-            Ok(())
-        })?;
-        Ok((radii, estimates))
+        self.written(estimates, |isa, points, options, normals, scratch| {
+            fast::paper::compute_with_radii(isa, points, options, normals, sizes, scratch)
+        })
     }
 
     fn even_windows(
@@ -377,30 +386,41 @@ impl paper::Engine for Engine<'_> {
         cloud: &Cloud,
         asked: &Asked,
         needed: &[bool],
-    ) -> Result<Vec<EvenWindow>, Error> {
+        windows: &mut Vec<EvenWindow>,
+    ) -> Result<(), Error> {
         if self.is_plain {
-            return Ok(paper::even_windows(cloud, asked, needed));
+            windows.clear();
+            windows.extend(paper::even_windows(cloud, asked, needed));
+            return Ok(());
         }
         let threads = self.options.threads;
-        fast::paper::even_windows(self.isa, cloud, asked, needed, threads, self.scratch)
+        fast::paper::even_windows(self.isa, cloud, asked, needed, windows, threads, self.scratch)
     }
 
-    fn choices(&mut self, even: &EvenWindows) -> Result<Vec<Option<usize>>, Error> {
+    fn choices(
+        &mut self,
+        even: &EvenWindows,
+        choices: &mut Vec<Option<usize>>,
+    ) -> Result<(), Error> {
+        choices.clear();
         if self.is_plain {
-            return Ok(even.choices());
+            choices.extend(even.choices());
+            return Ok(());
         }
-        fast::paper::choices(self.isa, even, self.options.threads, self.scratch)
+        choices.resize(even.windows.len(), None);
+        fast::paper::choices(self.isa, even, choices, self.options.threads, self.scratch)
     }
 
-    fn of_radii(&mut self, radii: &[u32]) -> Result<Vec<Estimate>, Error> {
+    fn of_radii(&mut self, radii: &[u32], estimates: &mut Vec<[f32; 4]>) -> Result<(), Error> {
         if self.is_plain {
             let width = self.points.width();
-            return Ok(self.plain(|(x, y)| {
+            self.plain(estimates, |(x, y)| {
                 let radius = radii[y * width + x] as usize;
                 (radius > 0).then(|| paper::of_radius(self.points, self.options, (x, y), radius))
-            }));
+            });
+            return Ok(());
         }
-        self.written(|isa, points, options, normals, scratch| {
+        self.written(estimates, |isa, points, options, normals, scratch| {
             fast::paper::compute_of_radii(isa, points, options, radii, normals, scratch)
         })
     }

@@ -168,6 +168,27 @@ pub(crate) fn compute(
     Ok(())
 }
 
+/// The sides of all pixels' windows, row by row, 0 for none, and their normals.
+pub(crate) fn compute_with_sides(
+    isa: Isa,
+    points: &Points,
+    options: &Options,
+    normals: &Normals,
+    found: &mut Vec<u32>,
+    scratch: &mut Scratch,
+) -> Result<(), Error> {
+    compute(isa, points, options, None, normals, scratch)?;
+    let width = points.width();
+    found.clear();
+    for Chunk { own, swept, start } in &scratch.chunks {
+        for y in own.clone() {
+            let row = sides(&scratch.rows, width, start + y - swept.start);
+            found.extend(row[..width].iter().map(|side| *side as u32));
+        }
+    }
+    Ok(())
+}
+
 /// Grows a buffer to `length` elements.
 fn reserve<T: Clone>(rows: &mut Vec<T>, length: usize, zero: T) -> Result<(), Error> {
     if rows.len() < length {

@@ -25,6 +25,18 @@ impl Estimate {
     pub const NONE: Estimate = Estimate { normal: [f32::NAN; 3], curvature: f32::NAN };
 }
 
+impl From<[f32; 4]> for Estimate {
+    fn from([x, y, z, curvature]: [f32; 4]) -> Self {
+        Estimate { normal: [x, y, z], curvature }
+    }
+}
+
+impl From<Estimate> for [f32; 4] {
+    fn from(Estimate { normal: [x, y, z], curvature }: Estimate) -> Self {
+        [x, y, z, curvature]
+    }
+}
+
 /// The estimate of pixel `(x, y)` from a window of `side` x `side` pixels, by walking over the window.
 pub(crate) fn estimate(
     method: Method,

@@ -6,6 +6,7 @@ use crate::methods::is_finite;
 use crate::options::{Depth, Options, Semantics};
 
 /// An organized cloud, row by row. A missing point has NaN coordinates and NaN depth.
+#[derive(Debug, Default)]
 pub(crate) struct Cloud {
     pub width: usize,
     pub height: usize,
@@ -15,14 +16,28 @@ pub(crate) struct Cloud {
 
 impl Cloud {
     pub fn new(points: &Points, options: &Options) -> Self {
+        let mut cloud = Cloud::default();
+        cloud.read(points, options);
+        cloud
+    }
+
+    /// Becomes another cloud.
+    pub fn read(&mut self, points: &Points, options: &Options) {
         let (width, height) = (points.width(), points.height());
+        (self.width, self.height) = (width, height);
         let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
-        let points: Vec<[f32; 3]> = pixels.map(|(x, y)| cleaned.at(x, y)).collect();
+        self.points.clear();
+        self.points.extend(pixels.map(|(x, y)| cleaned.at(x, y)));
         let range = options.semantics == Semantics::Paper && options.paper.depth == Depth::Range;
         let depth = |&[x, y, z]: &[f32; 3]| if range { (x * x + y * y + z * z).sqrt() } else { z };
-        let depths = points.iter().map(depth).collect();
-        Cloud { width, height, points, depths }
+        self.depths.clear();
+        self.depths.extend(self.points.iter().map(depth));
+    }
+
+    /// Bytes held.
+    pub fn size(&self) -> usize {
+        self.points.capacity() * size_of::<[f32; 3]>() + self.depths.capacity() * size_of::<f32>()
     }
 
     pub fn index(&self, x: usize, y: usize) -> usize {

@@ -2,20 +2,25 @@
 
 use super::rect::Rect;
 use super::summed_area::SummedArea;
-use crate::methods::Estimate;
 
 /// Integral images of the first pass' normals.
+#[derive(Debug, Default)]
 pub(crate) struct SummedNormals {
     sums: SummedArea<4>,
 }
 
 impl SummedNormals {
-    pub fn new(estimates: &[Estimate], width: usize, height: usize) -> Self {
-        let value = |at: usize| {
-            let [x, y, z] = estimates[at].normal.map(f64::from);
+    /// Sums other normals.
+    pub fn sum(&mut self, estimates: &[[f32; 4]], width: usize, height: usize) {
+        self.sums.sum_up(width, height, |at: usize| {
+            let [x, y, z, _] = estimates[at].map(f64::from);
             if x.is_nan() { [0.0; 4] } else { [x, y, z, 1.0] }
-        };
-        SummedNormals { sums: SummedArea::new(width, height, value) }
+        });
+    }
+
+    /// Bytes held.
+    pub fn size(&self) -> usize {
+        self.sums.size()
     }
 
     /// How much the normals in a rectangle vary: 1 - |mean|^2, for small angles their variance in square radians;

@@ -34,7 +34,7 @@ pub(crate) const JAGGED_POINTS: f64 = 0.8;
 pub(crate) const REACH: f32 = 3.0;
 
 /// A pixel's even window, and what it is worth.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 #[repr(C)] // Eight floats, which the fast form reads as such.
 pub(crate) struct EvenWindow {
     /// A whole number; 0 for no window.
@@ -102,12 +102,16 @@ fn largest_radius(wanted: u32, limit: u32) -> u32 {
 }
 
 /// The even windows of the needed pixels, row by row: the plain form.
-pub(crate) fn even_windows(cloud: &Cloud, asked: &Asked, needed: &[bool]) -> Vec<EvenWindow> {
-    let pixels = (0..cloud.height).flat_map(|y| (0..cloud.width).map(move |x| (x, y)));
-    let window = |(pixel, needed): (_, &bool)| {
+pub(crate) fn even_windows<'a>(
+    cloud: &'a Cloud,
+    asked: &'a Asked,
+    needed: &'a [bool],
+) -> impl Iterator<Item = EvenWindow> + 'a {
+    let pixels = (0..cloud.height).flat_map(move |y| (0..cloud.width).map(move |x| (x, y)));
+    let window = move |(pixel, needed): (_, &bool)| {
         needed.then(|| even_window(cloud, asked, pixel)).flatten().unwrap_or_default()
     };
-    pixels.zip(needed).map(window).collect()
+    pixels.zip(needed).map(window)
 }
 
 fn even_window(cloud: &Cloud, asked: &Asked, pixel: (usize, usize)) -> Option<EvenWindow> {
@@ -164,7 +168,7 @@ pub(crate) struct EvenWindows<'a> {
     pub asked: &'a Asked<'a>,
     pub options: &'a Options,
     /// Row by row.
-    pub windows: Vec<EvenWindow>,
+    pub windows: &'a [EvenWindow],
 }
 
 impl EvenWindows<'_> {
@@ -174,9 +178,9 @@ impl EvenWindows<'_> {
     }
 
     /// The pixel whose window each pixel takes, if there is one: the plain form.
-    pub fn choices(&self) -> Vec<Option<usize>> {
+    pub fn choices(&self) -> impl Iterator<Item = Option<usize>> {
         let choice = |at: usize| (self.asked.levels[at] > 0).then(|| self.best(at)).flatten();
-        (0..self.windows.len()).map(choice).collect()
+        (0..self.windows.len()).map(choice)
     }
 
     /// The pixel whose window is worth most to a pixel, among itself and those at the places of the windows that it

@@ -12,6 +12,7 @@ mod even_windows;
 mod methods;
 mod planes;
 mod rect;
+mod second_pass;
 pub(crate) mod smoothing_area;
 mod summed_area;
 mod surroundings;
@@ -24,16 +25,14 @@ pub(crate) use even_windows::{
 pub(crate) use methods::estimate as plain_estimate;
 pub(crate) use planes::{JITTER, Plane, inverse_depth};
 pub(crate) use rect::Rect;
+pub(crate) use second_pass::{Engine, SecondPass};
 pub(crate) use smoothing_area::window;
 
-use creases::SummedNormals;
 use depth_change::DepthChanges;
 
-use crate::Error;
 use crate::cloud::Points;
 use crate::methods::Estimate;
-use crate::options::{Method, Options, Semantics};
-use crate::orientation::turn_to_viewpoint;
+use crate::options::{Options, Semantics};
 
 /// The maps of [`Semantics::Paper`], row by row.
 pub(crate) struct PaperMaps {
@@ -135,55 +134,6 @@ fn least_depth_change(depth: f32, options: &Options) -> f32 {
     }
 }
 
-/// How windows and their estimates are computed: by the plain forms, or fast. Estimates are turned to the viewpoint.
-pub(crate) trait Engine {
-    /// Every pixel's window, 0 for none, as a radius, or in PCL's semantics as a side; and its estimate.
-    fn windows(&mut self) -> Result<(Vec<u32>, Vec<Estimate>), Error>;
-
-    /// The even windows of the needed pixels.
-    fn even_windows(
-        &mut self,
-        cloud: &Cloud,
-        asked: &Asked,
-        needed: &[bool],
-    ) -> Result<Vec<EvenWindow>, Error>;
-
-    /// The pixel whose window each pixel takes, if there is one.
-    fn choices(&mut self, even: &EvenWindows) -> Result<Vec<Option<usize>>, Error>;
-
-    /// The estimates of other windows, for the pixels that have one, by their radii.
-    fn of_radii(&mut self, radii: &[u32]) -> Result<Vec<Estimate>, Error>;
-}
-
-/// The size that the window of a pixel has far from any depth change, as [`Engine::windows`] gives them; 0 at a
-/// missing point.
-fn wanted_size(cloud: &Cloud, options: &Options, at: usize) -> u32 {
-    match options.semantics {
-        Semantics::Paper => smoothing_area::depth_radius(cloud.depths[at], &options.paper) as u32,
-        Semantics::Pcl => {
-            crate::smoothing_area::window_side(f32::INFINITY, cloud.points[at][2], options)
-        }
-    }
-}
-
-/// The radius of a window of a size as [`Engine::windows`] gives them.
-fn radius_of_size(size: u32, options: &Options) -> u32 {
-    match options.semantics {
-        Semantics::Paper => size,
-        Semantics::Pcl => size / 2,
-    }
-}
-
-/// The window of a size as [`Engine::windows`] gives them, without what lies outside the image.
-fn window_of_size(cloud: &Cloud, options: &Options, at: usize, size: u32) -> Rect {
-    let (width, height) = (cloud.width, cloud.height);
-    let (pixel, size) = ((at % width, at / width), size as usize);
-    match options.semantics {
-        Semantics::Paper => window(pixel, size, width, height),
-        Semantics::Pcl => rect_around(pixel, (size, size), (width, height)),
-    }
-}
-
 /// The part inside the image of a window of any size.
 fn rect_around(pixel: (usize, usize), size: (usize, usize), image: (usize, usize)) -> Rect {
     let range = |at: usize, size: usize, limit: usize| {
@@ -203,82 +153,3 @@ pub(crate) fn of_radius(
     let rect = window(pixel, radius, points.width(), points.height());
     methods::estimate(options.method, &cleaned, &rect)
 }
-
-/// The estimates of all pixels, row by row, turned to the viewpoint: near depth changes and near creases from the
-/// even windows of a second pass, as the options ask.
-pub(crate) fn estimates(
-    points: &Points,
-    options: &Options,
-    engine: &mut impl Engine,
-) -> Result<Vec<Estimate>, Error> {
-    let (sizes, mut estimates) = engine.windows()?;
-    if !(options.one_sided_windows || options.crease_windows) {
-        return Ok(estimates);
-    }
-    let cloud = Cloud::new(points, options);
-    let (width, height) = (cloud.width, cloud.height);
-    let pixels = || (0..width * height).map(|at| (at, (at % width, at / width)));
-    let wanted: Vec<u32> = (0..width * height).map(|at| wanted_size(&cloud, options, at)).collect();
-    let clean = depth_changes(&cloud, options).not_explained(&cloud).clean_radii();
-    let limit = options.paper.largest_radius;
-    let radius = |size: &u32| radius_of_size(*size, options).min(limit);
-    let wanted_radii: Vec<u32> = wanted.iter().map(radius).collect();
-    let normals = options.crease_windows.then(|| SummedNormals::new(&estimates, width, height));
-    // None unless another pixel's window may serve better than its own.
-    let levels = |at: usize| {
-        let is_near_crease = || {
-            sizes[at] > 0
-                && normals.as_ref().is_some_and(|normals| {
-                    normals.vary_in(&window_of_size(&cloud, options, at, sizes[at]))
-                })
-        };
-        if options.one_sided_windows && sizes[at] < wanted[at] {
-            EVERY_LEVEL
-        } else if !cloud.is_missing(at) && is_near_crease() {
-            CREASE_LEVELS
-        } else {
-            0
-        }
-    };
-    let levels: Vec<u8> = (0..width * height).map(levels).collect();
-    let asked = Asked {
-        wanted: &wanted_radii,
-        levels: &levels,
-        clean: &clean,
-        limit,
-        least_noise: Asked::least_noise(options.paper.alpha),
-    };
-    let windows = engine.even_windows(&cloud, &asked, &asked.needed(width, height))?;
-    let even = EvenWindows { cloud: &cloud, asked: &asked, options, windows };
-    let choices = engine.choices(&even)?;
-    let mut taken = vec![0; width * height];
-    for other in choices.iter().flatten() {
-        taken[*other] = even.radius(*other);
-    }
-    let second = engine.of_radii(&taken)?;
-    for (at, pixel) in pixels().filter(|(at, _)| levels[*at] > 0) {
-        let found =
-            choices[at].map(|other| second[other]).filter(|found| !found.normal[0].is_nan());
-        let around = || {
-            let same = |depth: f32, difference: f32, distance: usize| {
-                !is_depth_change(depth, difference, distance.max(1), options)
-            };
-            let has_none = options.one_sided_windows && estimates[at].normal[0].is_nan();
-            has_none.then(|| surroundings::plane_around(&cloud, pixel, same)).flatten()
-        };
-        if let Some(found) = found.or_else(around) {
-            let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
-            estimates[at] = Estimate { normal, ..found };
-        }
-    }
-    if options.method != Method::CovarianceMatrix {
-        estimates.iter_mut().for_each(|estimate| estimate.curvature = f32::NAN);
-    }
-    Ok(estimates)
-}
-
-/// As often as a radius can be halved.
-const EVERY_LEVEL: u8 = u32::BITS as u8;
-
-/// A crease does not bound the windows next to it as a depth change does: of the sizes that are tried, these many.
-const CREASE_LEVELS: u8 = 2;

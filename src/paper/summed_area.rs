@@ -3,16 +3,20 @@
 use super::rect::Rect;
 
 /// Sums over every rectangle from the image's first pixel, with a row and a column of zeros before it.
+#[derive(Debug, Default)]
 pub(crate) struct SummedArea<const N: usize> {
     stride: usize,
     sums: Vec<[f64; N]>,
 }
 
 impl<const N: usize> SummedArea<N> {
-    /// The integral image of what `value` gives for every pixel number.
-    pub fn new(width: usize, height: usize, value: impl Fn(usize) -> [f64; N]) -> Self {
+    /// Becomes the integral image of what `value` gives for every pixel number.
+    pub fn sum_up(&mut self, width: usize, height: usize, value: impl Fn(usize) -> [f64; N]) {
         let stride = width + 1;
-        let mut sums = vec![[0.0; N]; stride * (height + 1)];
+        let SummedArea { stride: kept, sums } = self;
+        *kept = stride;
+        sums.clear();
+        sums.resize(stride * (height + 1), [0.0; N]);
         for y in 0..height {
             let (above, row) = sums[y * stride..].split_at_mut(stride);
             let mut along = [0.0; N];
@@ -24,7 +28,11 @@ impl<const N: usize> SummedArea<N> {
                 }
             }
         }
-        SummedArea { stride, sums }
+    }
+
+    /// Bytes held.
+    pub fn size(&self) -> usize {
+        self.sums.capacity() * size_of::<[f64; N]>()
     }
 
     /// The sum over a rectangle (Eq. 3, not divided).

@@ -123,6 +123,7 @@ fn error_of_differences(count: usize, largest: f32) -> f64 {
 /// The processor has the instruction set of `S`; all of `places` are inside.
 #[inline(always)]
 pub(crate) unsafe fn gather<S: Simd>(points: &[Counted], places: &[i32; GROUP]) -> [Floats<S>; 4] {
+    debug_assert!(places.iter().all(|at| (*at as usize) < points.len()));
     let points = points.as_ptr();
     // SAFETY: as the caller's; a point is half a group.
     unsafe {

@@ -93,18 +93,19 @@ pub(crate) fn compute_with_radii(
     points: &Points,
     options: &Options,
     normals: &Normals,
+    radii: &mut Vec<u32>,
     scratch: &mut super::Scratch,
-) -> Result<Vec<u32>, Error> {
+) -> Result<(), Error> {
     compute(isa, points, options, None, normals, scratch)?;
     let length = row_length(points.width());
-    let mut radii = Vec::with_capacity(points.width() * points.height());
+    radii.clear();
     for chunk in &scratch.chunks {
         let first = chunk.start + chunk.own.start - chunk.swept.start;
         let rows = scratch.paper.radii[first * length..].chunks(length).take(chunk.own.len());
         radii
             .extend(rows.flat_map(|row| row[..points.width()].iter().map(|radius| *radius as u32)));
     }
-    Ok(radii)
+    Ok(())
 }
 
 /// The normals of the pixels that have a window of one of these radii, row by row; NaN for the others.
@@ -128,13 +129,14 @@ pub(crate) fn even_windows(
     cloud: &Cloud,
     asked: &Asked,
     needed: &[bool],
+    windows: &mut Vec<EvenWindow>,
     threads: usize,
     scratch: &mut super::Scratch,
-) -> Result<Vec<EvenWindow>, Error> {
+) -> Result<(), Error> {
     scratch.prepare(threads)?;
     let super::Scratch { workers, each, .. } = scratch;
     let &Cloud { width, height, ref depths, .. } = cloud;
-    let mut windows = vec![EvenWindow::default(); width * height];
+    windows.resize(width * height, EvenWindow::default());
     let image = Parts(windows.as_mut_ptr());
     let radius = |at: usize| asked.largest(at).min(asked.clean[at]).max(asked.wanted[at]);
     let largest = (0..width * height).map(radius).max().unwrap_or(0) as usize;
@@ -146,19 +148,19 @@ pub(crate) fn even_windows(
         // SAFETY: the processor has the instruction set, and tiles do not share pixels.
         unsafe { paths::run(isa, EvenTask { tile: &tile, rings, image: &image }) };
     });
-    Ok(windows)
+    Ok(())
 }
 
 /// The pixel whose even window each pixel takes, if there is one.
 pub(crate) fn choices(
     isa: Isa,
     even: &EvenWindows,
+    choices: &mut [Option<usize>],
     threads: usize,
     scratch: &mut super::Scratch,
-) -> Result<Vec<Option<usize>>, Error> {
+) -> Result<(), Error> {
     scratch.prepare(threads)?;
     let &Cloud { width, height, .. } = even.cloud;
-    let mut choices = vec![None; width * height];
     let parts = Parts(choices.as_mut_ptr());
     scratch.workers.for_each(height, |_, y| {
         // SAFETY: rows do not overlap.
@@ -166,7 +168,7 @@ pub(crate) fn choices(
         // SAFETY: the processor has the instruction set.
         unsafe { paths::run(isa, ChoicesTask { even, y, row }) };
     });
-    Ok(choices)
+    Ok(())
 }
 
 /// The image in tiles of like sizes, whose rings stay in the cache.

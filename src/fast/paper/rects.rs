@@ -82,6 +82,7 @@ impl Rects {
     #[inline(always)]
     pub unsafe fn sums<S: Simd, const N: usize>(&self, sums: &[[f64; N]]) -> [Doubles<S>; N] {
         const { assert!(N.is_multiple_of(4)) };
+        debug_assert!(self.corners.as_flattened().iter().all(|at| (*at as usize) < sums.len()));
         // SAFETY: as the caller's; an element has fours of channels.
         unsafe {
             let mut channels = [Doubles::splat(0.0); N];
