@@ -5,11 +5,11 @@ use std::ops::Range;
 
 use super::integrals::{Rings, reached, rows_of_rings};
 use super::methods::{CovarianceMatrix, MOMENTS};
-use super::rects::{Place, Rects};
+use super::rects::{Place, Rects, STEPS};
 use crate::fast::Parts;
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::paper::{
-    Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, Plane, inverse_depth, window,
+    Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, Plane, inverse_depth,
 };
 use crate::simd::{GROUP, Simd};
 
@@ -141,49 +141,46 @@ impl EvenTile<'_> {
         count: usize,
     ) -> [EvenWindow; GROUP] {
         let first = pixel.1 * self.width + pixel.0;
-        let (mut wanted, mut clean, mut largest) = ([0; GROUP], [0; GROUP], [0; GROUP]);
+        let [mut wanted, mut clean, mut largest] = [[0.0; GROUP]; 3];
         for lane in 0..count {
-            if !self.needed[first + lane] {
-                continue;
+            if self.needed[first + lane] {
+                wanted[lane] = self.asked.wanted[first + lane] as f32;
+                clean[lane] = self.asked.clean[first + lane] as f32;
+                largest[lane] = (self.asked.largest(first + lane) as f32).min(clean[lane]);
             }
-            wanted[lane] = self.asked.wanted[first + lane];
-            clean[lane] = self.asked.clean[first + lane];
-            largest[lane] = self.asked.largest(first + lane).min(clean[lane]);
         }
         // SAFETY: as the caller's.
         unsafe {
+            let (wanted, clean) =
+                (Floats(S::load(wanted.as_ptr())), Floats(S::load(clean.as_ptr())));
             let mut found = Fits::<S>::none();
             // On steep surfaces, windows with depth changes.
+            let smallest = Floats::splat(JAGGED_RADIUS as f32 - 1.0);
             let mut radii = wanted;
-            let mut todo = above(&radii, &clean) & above(&radii, &[JAGGED_RADIUS - 1; GROUP]);
+            let mut todo = clean.lt(radii) & smallest.lt(radii);
             let mut done = 0;
             while todo != 0 {
-                let (fits, there) = self.fits::<S>(rings, moments, pixel, &radii, todo);
-                let jagged = there & self.jagged(&fits, pixel, &radii, count);
+                let (fits, there) = self.fits(rings, moments, pixel, radii, todo);
+                let jagged = there & self.jagged(&fits, pixel, radii);
                 found.take(jagged, &fits);
                 done |= jagged;
-                for radius in &mut radii {
-                    *radius = *radius * 7 / 10;
-                }
-                todo &= !jagged & above(&radii, &clean);
-                todo &= above(&radii, &[JAGGED_RADIUS - 1; GROUP]);
+                radii.0 = S::truncate((radii * Floats::splat(7.0) / Floats::splat(10.0)).0);
+                todo &= !jagged & clean.lt(radii) & smallest.lt(radii);
             }
             // Windows without, and smaller ones while those are much more even.
-            radii = largest;
-            todo = !done & above(&radii, &[0; GROUP]);
+            radii = Floats(S::load(largest.as_ptr()));
+            todo = Floats::splat(0.0).lt(radii) & !done;
             let least = Doubles::splat(f64::from(self.asked.least_noise));
             let mut is_first = true;
             while todo != 0 {
-                let (fits, there) = self.fits::<S>(rings, moments, pixel, &radii, todo);
+                let (fits, there) = self.fits(rings, moments, pixel, radii, todo);
                 todo = there;
                 if !is_first {
                     todo &= fits.noise.max(least).lt(found.unevenness);
                 }
                 found.take(todo, &fits);
-                todo &= above(&radii, &[1; GROUP]);
-                for radius in &mut radii {
-                    *radius /= 2;
-                }
+                todo &= Floats::splat(1.0).lt(radii);
+                radii.0 = S::truncate((radii * Floats::splat(0.5)).0);
                 is_first = false;
             }
             found.windows()
@@ -200,7 +197,7 @@ impl EvenTile<'_> {
         rings: &Rings<MOMENTS>,
         moments: &CovarianceMatrix,
         (x, y): (usize, usize),
-        radii: &[u32; GROUP],
+        radii: Floats<S>,
         lanes: u32,
     ) -> (Fits<S>, u32) {
         let (left, stride, rows) = (rings.left(), rings.stride(), rings.rows);
@@ -208,29 +205,27 @@ impl EvenTile<'_> {
         let (_, sums) = rings.parts();
         // SAFETY: as the caller's.
         unsafe {
-            let radii = Floats(S::load(radii.map(|radius| radius as f32).as_ptr()));
             let rects = Rects::new::<S>(&place, radii.0, false, false);
             let [sx, sy, sr, n, xx, yy, rr, _, xy, yr, xr, _] = rects.sums::<S, MOMENTS>(sums);
-            let (mx, my, mr) = (sx / n, sy / n, sr / n);
+            let share = Doubles::splat(1.0) / n;
+            let (mx, my, mr) = (sx * share, sy * share, sr * share);
             let (xx, xy, yy) = (xx - sx * mx, xy - sx * my, yy - sy * my);
             let (xr, yr, rr) = (xr - sx * mr, yr - sy * mr, rr - sr * mr);
             let determinant = xx * yy - xy * xy;
             let there = Doubles::splat(Plane::FEWEST - 0.5).lt(n)
                 & (Doubles::splat(Plane::LINE) * xx * yy).lt(determinant)
                 & lanes;
-            let slope = [(xr * yy - yr * xy) / determinant, (yr * xx - xr * xy) / determinant];
+            let scale = Doubles::splat(1.0) / determinant;
+            let slope = [(xr * yy - yr * xy) * scale, (yr * xx - xr * xy) * scale];
             let deviation = rr - slope[0] * xr - slope[1] * yr;
             let unevenness = deviation.max(Doubles::splat(0.0)) / (n - Doubles::splat(3.0));
             let chance = Floats::splat(2.0) / (n.narrow() - Floats::splat(3.0));
             let chance = Floats::splat(1.0) + Floats::splat(CHANCE) * chance.sqrt();
             let noise = unevenness * chance.widen();
             // The pixels' own positions.
-            let mut columns = [0.0; GROUP];
-            for (lane, column) in columns.iter_mut().enumerate() {
-                *column = (x + lane) as f64;
-            }
+            let column = (Floats(S::load(STEPS.as_ptr())) + Floats::splat(x as f32)).widen();
             let [left, top, origin] = moments.origin.map(|o| Doubles::splat(f64::from(o)));
-            let across = Doubles(S::load_d(columns.as_ptr())) - left - mx;
+            let across = column - left - mx;
             let down = Doubles::splat(y as f64) - top - my;
             let inverse_depth = origin + mr + slope[0] * across + slope[1] * down;
             (
@@ -249,30 +244,30 @@ impl EvenTile<'_> {
         &self,
         fits: &Fits<S>,
         (x, y): (usize, usize),
-        radii: &[u32; GROUP],
-        count: usize,
+        radii: Floats<S>,
     ) -> u32 {
-        let mut fewest = [0.0; GROUP];
-        for lane in 0..count {
-            let rect = window((x + lane, y), radii[lane] as usize, self.width, self.height);
-            fewest[lane] = JAGGED_POINTS * rect.area() as f64;
-        }
         let [a, b] = fits.slope;
         // SAFETY: as the caller's.
         unsafe {
+            let column = Floats(S::load(STEPS.as_ptr())) + Floats::splat(x as f32);
+            let row = Floats::splat(y as f32);
+            let area = side(column, radii, self.width) * side(row, radii, self.height);
             let limit = Doubles::splat(JAGGED * JAGGED) * (a * a + b * b);
-            let fewest = Doubles(S::load_d(fewest.as_ptr()));
+            let fewest = Doubles::splat(JAGGED_POINTS) * area.widen();
             !limit.lt(fits.unevenness) & !fits.points.lt(fewest)
         }
     }
 }
 
-/// The lanes in which one is above the other.
+/// How many columns or rows, of so many, windows around `at` have.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
 #[inline(always)]
-fn above(values: &[u32; GROUP], others: &[u32; GROUP]) -> u32 {
-    let mut lanes = 0;
-    for lane in 0..GROUP {
-        lanes |= u32::from(values[lane] > others[lane]) << lane;
+unsafe fn side<S: Simd>(at: Floats<S>, radii: Floats<S>, count: usize) -> Floats<S> {
+    // SAFETY: as the caller's.
+    unsafe {
+        let end = at + radii + Floats::splat(1.0);
+        Floats(S::min(end.0, S::splat(count as f32))) - (at - radii).max(Floats::splat(0.0))
     }
-    lanes
 }

@@ -35,7 +35,7 @@ pub(crate) struct Rects {
 }
 
 /// Pixel numbers in a group.
-const STEPS: [f32; GROUP] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+pub(crate) const STEPS: [f32; GROUP] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 impl Rects {
     /// Where eight windows lie, as `paper::smoothing_area::window` has them.
