@@ -34,9 +34,9 @@ const BOUNDS: [(Semantics, Method, BorderPolicy, u64, u64); 10] = [
     (Pcl, AverageDepthChange, Ignore, 135, 209),
     (Pcl, AverageDepthChange, Mirror, 289, 343),
     (Pcl, Simple3DGradient, Ignore, 113, 186),
-    (Paper, CovarianceMatrix, Ignore, 305, 486),
-    (Paper, Average3DGradient, Ignore, 237, 348),
-    (Paper, AverageDepthChange, Ignore, 259, 380),
+    (Paper, CovarianceMatrix, Ignore, 282, 486),
+    (Paper, Average3DGradient, Ignore, 235, 348),
+    (Paper, AverageDepthChange, Ignore, 221, 368),
 ];
 
 fn main() -> ExitCode {
