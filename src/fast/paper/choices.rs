@@ -1,6 +1,7 @@
 //! Which even window each pixel takes, fast, for one row of the image: the plain form is in `paper::even_windows`. The
 //! windows at one place of eight pixels are gathered and weighed together.
 
+use super::rects::STEPS;
 use crate::fast::arithmetic::Floats;
 use crate::fast::tile::Bits;
 use crate::paper::{
@@ -19,16 +20,20 @@ const PLACES: [(usize, usize); 8] =
 #[inline(always)]
 pub(super) unsafe fn row<S: Simd>(even: &EvenWindows, y: usize, choices: &mut [Option<usize>]) {
     let neighbours = Neighbours::new(even.cloud, y);
-    let mut found = Vec::new();
+    // SAFETY: as the caller's.
+    let noise = unsafe { Floats::<S>::splat(0.0) };
+    let mut found = Found { candidates: Vec::new(), number: 0, noise };
     for x in (0..choices.len()).step_by(GROUP) {
         let choices = &mut choices[x..];
         let count = choices.len().min(GROUP);
         let group = Group { even, x, y, count };
         // SAFETY: as the caller's.
         unsafe {
-            let Some(noise) = group.candidates::<S>(&mut found) else { continue };
-            let near = neighbours.near::<S>(&group);
-            group.choose(&found, noise, &near, &mut choices[..count]);
+            group.candidates(&mut found);
+            if found.number > 0 {
+                let near = neighbours.near(&group);
+                group.choose(&found, &near, &mut choices[..count]);
+            }
         }
     }
 }
@@ -67,98 +72,60 @@ struct Near<S: Simd> {
     own: Floats<S>,
 }
 
-impl Group<'_> {
-    /// Puts the windows that the pixels may take into `found`, and returns the least noise among them; none if no
-    /// pixel takes another window.
-    ///
+impl<S: Simd> Candidates<S> {
     /// # Safety
     /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    unsafe fn candidates<S: Simd>(&self, found: &mut Vec<Candidates<S>>) -> Option<Floats<S>> {
-        let &Group { even, x, y, count } = self;
-        let &Cloud { width, height, .. } = even.cloud;
-        let first = y * width + x;
-        let levels = &even.asked.levels[first..first + count];
-        let mut lanes = 0;
-        for (lane, levels) in levels.iter().enumerate() {
-            lanes |= u32::from(*levels > 0) << lane;
-        }
-        if lanes == 0 {
-            return None;
-        }
-        found.clear();
-        // Lanes outside the image stand for the last pixel of the row.
-        let mut columns = [0; GROUP];
-        let mut radii = [0; GROUP];
-        for (lane, column) in columns.iter_mut().enumerate() {
-            *column = (x + lane).min(width - 1);
-        }
-        for lane in Bits(lanes) {
-            radii[lane] = even.asked.largest(first + lane) as usize;
-        }
-        let places = columns.map(|column| y * width + column);
-        // SAFETY: as the caller's; all places are inside the image.
-        unsafe {
-            let zero = Floats::splat(0.0);
-            let mut noise = Floats::splat(f32::INFINITY);
-            let mut add = |candidates: Candidates<S>| {
-                let less = S::min(candidates.noise.0, noise.0);
-                noise.0 = S::select(S::mask(candidates.lanes), less, noise.0);
-                found.push(candidates);
-            };
-            add(self.gather(places, [zero; 2], lanes));
-            for level in 0.. {
-                let mut active = 0;
-                for lane in Bits(lanes) {
-                    let there = radii[lane] > 0 && levels[lane] > level;
-                    active |= u32::from(there) << lane;
-                }
-                if active == 0 {
-                    break;
-                }
-                let (mut at_columns, mut to_columns) = ([columns; 3], [[0.0; GROUP]; 3]);
-                let (mut at_rows, mut to_rows) = ([[y * width; GROUP]; 3], [[0.0; GROUP]; 3]);
-                for lane in 0..GROUP {
-                    let (column, radius) = (columns[lane], radii[lane]);
-                    let (left, right) = around(column, radius, width);
-                    let (up, down) = around(y, radius, height);
-                    (at_columns[0][lane], at_columns[2][lane]) = (left, right);
-                    (at_rows[0][lane], at_rows[2][lane]) = (up * width, down * width);
-                    to_columns[0][lane] = (column - left) as f32;
-                    to_columns[2][lane] = -((right - column) as f32);
-                    to_rows[0][lane] = (y - up) as f32;
-                    to_rows[2][lane] = -((down - y) as f32);
-                }
-                for (column, row) in PLACES {
-                    let mut places = [0; GROUP];
-                    for lane in 0..GROUP {
-                        places[lane] = at_rows[row][lane] + at_columns[column][lane];
-                    }
-                    let dx = Floats(S::load(to_columns[column].as_ptr()));
-                    let dy = Floats(S::load(to_rows[row].as_ptr()));
-                    add(self.gather(places, [dx, dy], active));
-                }
-                for radius in &mut radii {
-                    *radius /= 2;
-                }
-            }
-            Some(noise)
+    unsafe fn none() -> Self {
+        // SAFETY: as the caller's.
+        let zero = unsafe { Floats::splat(0.0) };
+        let [short, inverse_depth, unevenness, noise, per_noise, per_bend] = [zero; 6];
+        let (places, lanes, to_pixel, slope) = ([0; GROUP], 0, [zero; 2], [zero; 2]);
+        Candidates {
+            places,
+            lanes,
+            to_pixel,
+            short,
+            inverse_depth,
+            slope,
+            unevenness,
+            noise,
+            per_noise,
+            per_bend,
         }
     }
+}
 
-    /// The windows at places from which `to_pixel` leads to the pixels of these `lanes`.
+/// The windows that eight pixels may take.
+struct Found<S: Simd> {
+    /// Only so many mean something.
+    candidates: Vec<Candidates<S>>,
+    number: usize,
+    /// The least among them.
+    noise: Floats<S>,
+}
+
+impl<S: Simd> Found<S> {
+    /// Adds the windows at places from which `to_pixel` leads to the pixels of these `lanes`.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`; the places are inside the image.
     #[inline(always)]
-    unsafe fn gather<S: Simd>(
-        &self,
+    unsafe fn add(
+        &mut self,
+        windows: &[EvenWindow],
         places: [usize; GROUP],
         to_pixel: [Floats<S>; 2],
         lanes: u32,
-    ) -> Candidates<S> {
+    ) {
         const { assert!(size_of::<EvenWindow>() == 8 * size_of::<f32>()) };
-        let windows = self.even.windows.as_ptr().cast::<f32>();
+        debug_assert!(places.iter().all(|place| *place < windows.len()));
+        let windows = windows.as_ptr().cast::<f32>();
+        if self.number == self.candidates.len() {
+            // SAFETY: as the caller's.
+            self.candidates.push(unsafe { Candidates::none() });
+        }
+        let to = &mut self.candidates[self.number];
+        self.number += 1;
         // SAFETY: as the caller's; a window is eight floats.
         unsafe {
             let (mut front, mut back) = ([S::splat(0.0); 4], [S::splat(0.0); 4]);
@@ -173,17 +140,93 @@ impl Group<'_> {
             let radius = Floats(radius);
             let distance = to_pixel[0].abs().max(to_pixel[1].abs());
             let near = distance.lt(radius + Floats::splat(REACH + 1.0));
-            Candidates {
-                places,
-                lanes: lanes & zero.lt(radius) & near,
-                to_pixel,
-                short: (distance - radius).max(zero),
-                inverse_depth: Floats(inverse_depth),
-                slope: [Floats(across), Floats(down)],
-                unevenness: Floats(unevenness),
-                noise: Floats(noise),
-                per_noise: Floats(per_noise),
-                per_bend: Floats(per_bend),
+            to.places = places;
+            to.lanes = lanes & zero.lt(radius) & near;
+            to.to_pixel = to_pixel;
+            to.short = (distance - radius).max(zero);
+            to.inverse_depth = Floats(inverse_depth);
+            to.slope = [Floats(across), Floats(down)];
+            to.unevenness = Floats(unevenness);
+            to.noise = Floats(noise);
+            to.per_noise = Floats(per_noise);
+            to.per_bend = Floats(per_bend);
+            let less = S::min(noise, self.noise.0);
+            self.noise.0 = S::select(S::mask(to.lanes), less, self.noise.0);
+        }
+    }
+}
+
+impl Group<'_> {
+    /// Finds the windows that the pixels may take.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn candidates<S: Simd>(&self, found: &mut Found<S>) {
+        let &Group { even, x, y, count } = self;
+        let &Cloud { width, height, .. } = even.cloud;
+        let first = y * width + x;
+        let levels = &even.asked.levels[first..first + count];
+        let mut lanes = 0;
+        for (lane, levels) in levels.iter().enumerate() {
+            lanes |= u32::from(*levels > 0) << lane;
+        }
+        // Lanes outside the image stand for the last pixel of the row.
+        let mut columns = [0; GROUP];
+        let mut radii = [0; GROUP];
+        for (lane, column) in columns.iter_mut().enumerate() {
+            *column = (x + lane).min(width - 1);
+        }
+        for lane in Bits(lanes) {
+            radii[lane] = even.asked.largest(first + lane) as usize;
+        }
+        let places = columns.map(|column| y * width + column);
+        // SAFETY: as the caller's; all places are inside the image.
+        unsafe {
+            let zero = Floats::splat(0.0);
+            found.number = 0;
+            if lanes == 0 {
+                return;
+            }
+            found.noise = Floats::splat(f32::INFINITY);
+            found.add(even.windows, places, [zero; 2], lanes);
+            let row = Floats::<S>::splat(y as f32);
+            let last = Floats::<S>::splat((width - 1) as f32);
+            let column = Floats::<S>(S::load(STEPS.as_ptr())) + Floats::splat(x as f32);
+            let column = Floats(S::min(column.0, last.0));
+            for level in 0.. {
+                let mut active = 0;
+                for lane in Bits(lanes) {
+                    let there = radii[lane] > 0 && levels[lane] > level;
+                    active |= u32::from(there) << lane;
+                }
+                if active == 0 {
+                    break;
+                }
+                let mut at_columns = [columns; 3];
+                let mut at_rows = [[y * width; GROUP]; 3];
+                let mut lengths = [0.0; GROUP];
+                for lane in 0..GROUP {
+                    let (left, right) = around(columns[lane], radii[lane], width);
+                    let (up, down) = around(y, radii[lane], height);
+                    (at_columns[0][lane], at_columns[2][lane]) = (left, right);
+                    (at_rows[0][lane], at_rows[2][lane]) = (up * width, down * width);
+                    lengths[lane] = radii[lane] as f32;
+                }
+                let lengths = Floats(S::load(lengths.as_ptr()));
+                let to_columns = ways(column, lengths, width);
+                let to_rows = ways(row, lengths, height);
+                for (column, row) in PLACES {
+                    let mut places = [0; GROUP];
+                    for lane in 0..GROUP {
+                        places[lane] = at_rows[row][lane] + at_columns[column][lane];
+                    }
+                    let to_pixel = [to_columns[column], to_rows[row]];
+                    found.add(even.windows, places, to_pixel, active);
+                }
+                for radius in &mut radii {
+                    *radius /= 2;
+                }
             }
         }
     }
@@ -195,8 +238,7 @@ impl Group<'_> {
     #[inline(always)]
     unsafe fn choose<S: Simd>(
         &self,
-        found: &[Candidates<S>],
-        noise: Floats<S>,
+        found: &Found<S>,
         near: &Near<S>,
         choices: &mut [Option<usize>],
     ) {
@@ -209,10 +251,12 @@ impl Group<'_> {
         unsafe {
             let (zero, one) = (Floats::splat(0.0), Floats::splat(1.0));
             let tolerance = Floats(S::load(tolerances.as_ptr()));
-            let noise = noise.max(Floats::splat(self.even.asked.least_noise));
+            let noise = found.noise.max(Floats::splat(self.even.asked.least_noise));
             let near_noise = Floats::splat(NEAR_NOISE) * noise / near.points;
             let mut least = Floats::splat(f32::INFINITY);
-            for candidates in found {
+            let mut best = S::splat(-1.0);
+            let found = &found.candidates[..found.number];
+            for (number, candidates) in found.iter().enumerate() {
                 let [dx, dy] = candidates.to_pixel;
                 let [across, down] = candidates.slope;
                 let far = one + candidates.short * candidates.short;
@@ -224,18 +268,19 @@ impl Group<'_> {
                 let misfit = (candidates.unevenness - noise).max(zero);
                 let bend = Floats::splat(MISFIT) * misfit + Floats::splat(NEAR) * astray;
                 let cost = (noise * candidates.per_noise + bend * candidates.per_bend) * far;
-                let mut best = cost.lt(least) & candidates.lanes;
-                let short = zero.lt(candidates.short);
-                if best & short != 0 {
-                    let at_pixel = candidates.inverse_depth + across * dx + down * dy;
-                    let steepness = (across * across + down * down).sqrt();
-                    let limit = tolerance + Floats::splat(JITTER) * steepness;
-                    best &= !short | (near.own - at_pixel).abs().lt(limit);
-                }
-                least.0 = S::select(S::mask(best), cost.0, least.0);
-                for lane in Bits(best) {
-                    choices[lane] = Some(candidates.places[lane]);
-                }
+                let at_pixel = candidates.inverse_depth + across * dx + down * dy;
+                let steepness = (across * across + down * down).sqrt();
+                let limit = tolerance + Floats::splat(JITTER) * steepness;
+                let lies_in = (near.own - at_pixel).abs().lt(limit);
+                let can_take = candidates.lanes & (lies_in | !zero.lt(candidates.short));
+                let better = S::mask(cost.lt(least) & can_take);
+                least.0 = S::select(better, cost.0, least.0);
+                best = S::select(better, S::splat(number as f32), best);
+            }
+            let mut numbers = [0; GROUP];
+            S::store_i(numbers.as_mut_ptr(), S::truncate_i(best));
+            for ((lane, number), choice) in numbers.into_iter().enumerate().zip(choices) {
+                *choice = found.get(number as usize).map(|candidates| candidates.places[lane]);
             }
         }
     }
@@ -245,6 +290,21 @@ impl Group<'_> {
 #[inline(always)]
 fn around(at: usize, radius: usize, count: usize) -> (usize, usize) {
     (at.saturating_sub(radius), (at + radius).min(count - 1))
+}
+
+/// The ways back from the first column or row, of so many, that windows reach around `at`, from `at` itself and from the
+/// last.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn ways<S: Simd>(at: Floats<S>, radii: Floats<S>, count: usize) -> [Floats<S>; 3] {
+    // SAFETY: as the caller's.
+    unsafe {
+        let zero = Floats::splat(0.0);
+        let rest = Floats::splat((count - 1) as f32) - at;
+        [Floats(S::min(radii.0, at.0)), zero, zero - Floats(S::min(radii.0, rest.0))]
+    }
 }
 
 /// The inverse depths of a row and those above and below.
