@@ -191,6 +191,22 @@ fn scratch_memory_is_small_and_stays() {
 }
 
 #[test]
+fn the_second_pass_keeps_its_tables() {
+    let cloud = Cloud::new(Kind::NanBlocks, 200, 150, 17);
+    let pixels = cloud.width * cloud.height;
+    for options in edge_options() {
+        let mut estimator = Estimator::new(options);
+        compute(&mut estimator, &cloud);
+        let size = estimator.scratch_size();
+        assert!(size >= 32 * pixels, "{size} bytes for {pixels} pixels");
+        compute(&mut estimator, &cloud);
+        assert_eq!(estimator.scratch_size(), size);
+        estimator.release_scratch();
+        assert_eq!(estimator.scratch_size(), 0);
+    }
+}
+
+#[test]
 fn released_scratch_comes_back() {
     let cloud = Cloud::new(Kind::Wavy, 100, 80, 16);
     for threads in [1, 2] {

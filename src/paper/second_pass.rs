@@ -85,21 +85,37 @@ impl SecondPass {
         options: &Options,
         engine: &mut impl Engine,
     ) -> Result<&[[f32; 4]], Error> {
-        let SecondPass { estimates, sizes, wanted, radii, levels, normals, .. } = self;
-        engine.windows(sizes, estimates)?;
+        engine.windows(&mut self.sizes, &mut self.estimates)?;
         if !(options.one_sided_windows || options.crease_windows) {
-            return Ok(estimates);
+            return Ok(&self.estimates);
         }
-        let (width, height) = (cloud.width, cloud.height);
-        let pixels = || (0..width * height).map(|at| (at, (at % width, at / width)));
-        refill(wanted, pixels().map(|(at, _)| wanted_size(cloud, options, at)));
-        let clean = depth_changes(cloud, options).not_explained(cloud).clean_radii();
         let limit = options.paper.largest_radius;
+        self.concern(cloud, options, limit);
+        let SecondPass { radii, levels, windows, choices, taken, second, .. } = self;
+        let clean = depth_changes(cloud, options).not_explained(cloud).clean_radii();
+        let least_noise = Asked::least_noise(options.paper.alpha);
+        let asked = Asked { wanted: radii, levels, clean: &clean, limit, least_noise };
+        engine.even_windows(cloud, &asked, &asked.needed(cloud.width, cloud.height), windows)?;
+        let even = EvenWindows { cloud, asked: &asked, options, windows };
+        engine.choices(&even, choices)?;
+        refill(taken, choices.iter().map(|_| 0));
+        for other in choices.iter().flatten() {
+            taken[*other] = even.radius(*other);
+        }
+        engine.of_radii(taken, second)?;
+        self.replace(cloud, options);
+        Ok(&self.estimates)
+    }
+
+    /// Finds the pixels that another pixel's window may serve better than their own.
+    fn concern(&mut self, cloud: &Cloud, options: &Options, limit: u32) {
+        let SecondPass { estimates, sizes, wanted, radii, levels, normals, .. } = self;
+        let pixels = 0..cloud.width * cloud.height;
+        refill(wanted, pixels.clone().map(|at| wanted_size(cloud, options, at)));
         refill(radii, wanted.iter().map(|size| radius_of_size(*size, options).min(limit)));
         if options.crease_windows {
-            normals.sum(estimates, width, height);
+            normals.sum(estimates, cloud.width, cloud.height);
         }
-        // None unless another pixel's window may serve better than its own.
         let levels_of = |at: usize| {
             let is_near_crease = || {
                 let window = || window_of_size(cloud, options, at, sizes[at]);
@@ -113,21 +129,16 @@ impl SecondPass {
                 0
             }
         };
-        refill(levels, (0..width * height).map(levels_of));
-        let least_noise = Asked::least_noise(options.paper.alpha);
-        let asked = Asked { wanted: radii, levels, clean: &clean, limit, least_noise };
-        let SecondPass { windows, choices, taken, second, .. } = self;
-        engine.even_windows(cloud, &asked, &asked.needed(width, height), windows)?;
-        let even = EvenWindows { cloud, asked: &asked, options, windows };
-        engine.choices(&even, choices)?;
-        refill(taken, pixels().map(|_| 0));
-        for other in choices.iter().flatten() {
-            taken[*other] = even.radius(*other);
-        }
-        engine.of_radii(taken, second)?;
-        for (at, pixel) in pixels().filter(|(at, _)| levels[*at] > 0) {
+        refill(levels, pixels.map(levels_of));
+    }
+
+    /// Gives the pixels concerned the estimates of the windows that they take.
+    fn replace(&mut self, cloud: &Cloud, options: &Options) {
+        let SecondPass { estimates, levels, choices, second, .. } = self;
+        for at in (0..estimates.len()).filter(|at| levels[*at] > 0) {
             let found = choices[at].map(|other| second[other]).filter(|found| !found[0].is_nan());
             let around = || {
+                let pixel = (at % cloud.width, at / cloud.width);
                 let same = |depth: f32, difference: f32, distance: usize| {
                     !is_depth_change(depth, difference, distance.max(1), options)
                 };
@@ -142,7 +153,6 @@ impl SecondPass {
         if options.method != Method::CovarianceMatrix {
             estimates.iter_mut().for_each(|estimate| estimate[3] = f32::NAN);
         }
-        Ok(estimates)
     }
 }
 
