@@ -10,7 +10,7 @@ use crate::methods::{Estimate, covariance_matrix, estimate, estimate_window};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
 use crate::paper::{
-    self, Asked, Cloud, EvenWindow, EvenWindows, PaperMaps, SecondPass, with_missing_as_nan,
+    self, Asked, Cloud, EvenWindow, EvenWindows, PaperMaps, SecondPass, refill, with_missing_as_nan,
 };
 use crate::smoothing_area::window_side;
 use crate::window::Image;
@@ -347,8 +347,7 @@ impl Engine<'_> {
                 Estimate { normal, ..found }
             })
         };
-        estimates.clear();
-        estimates.extend((0..width * height).map(|at| <[f32; 4]>::from(turned(at))));
+        refill(estimates, (0..width * height).map(|at| turned(at).into()));
     }
 }
 
@@ -358,7 +357,6 @@ impl paper::Engine for Engine<'_> {
         sizes: &mut Vec<u32>,
         estimates: &mut Vec<[f32; 4]>,
     ) -> Result<(), Error> {
-        sizes.clear();
         let (width, height) = (self.points.width(), self.points.height());
         if self.options.semantics == Semantics::Pcl {
             if !self.is_plain {
@@ -367,13 +365,14 @@ impl paper::Engine for Engine<'_> {
                 });
             }
             let plain = Plain::new(self.points, self.options);
-            sizes.extend((0..width * height).map(|at| plain.window_side(at % width, at / width)));
+            let side = |at: usize| plain.window_side(at % width, at / width);
+            refill(sizes, (0..width * height).map(side));
             self.plain(estimates, |(x, y)| Some(plain.estimate(x, y)));
             return Ok(());
         }
         if self.is_plain {
             let maps = PaperMaps::new(self.points, self.options);
-            sizes.extend(maps.smoothing_radii.iter().map(|radius| *radius as u32));
+            refill(sizes, maps.smoothing_radii.iter().map(|radius| *radius as u32));
             return self.of_radii(sizes, estimates);
         }
         self.written(estimates, |isa, points, options, normals, scratch| {
@@ -389,8 +388,7 @@ impl paper::Engine for Engine<'_> {
         windows: &mut Vec<EvenWindow>,
     ) -> Result<(), Error> {
         if self.is_plain {
-            windows.clear();
-            windows.extend(paper::even_windows(cloud, asked, needed));
+            refill(windows, paper::even_windows(cloud, asked, needed));
             return Ok(());
         }
         let threads = self.options.threads;
@@ -402,12 +400,11 @@ impl paper::Engine for Engine<'_> {
         even: &EvenWindows,
         choices: &mut Vec<Option<usize>>,
     ) -> Result<(), Error> {
-        choices.clear();
         if self.is_plain {
-            choices.extend(even.choices());
+            refill(choices, even.choices());
             return Ok(());
         }
-        choices.resize(even.windows.len(), None);
+        refill(choices, even.windows.iter().map(|_| None));
         fast::paper::choices(self.isa, even, choices, self.options.threads, self.scratch)
     }
 

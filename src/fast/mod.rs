@@ -34,6 +34,7 @@ use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::options::{Method, Options};
+use crate::paper::refill;
 use crate::simd::{GROUP, Simd};
 use crate::smoothing_area::depth_smoothing;
 use crate::threads::Workers;
@@ -117,6 +118,19 @@ struct Chunk {
     start: usize,
 }
 
+impl Chunk {
+    /// Which of the map's rows an own row of the chunk is.
+    fn place(&self, y: usize) -> usize {
+        self.start + y - self.swept.start
+    }
+}
+
+/// Reads a map's whole numbers, row by row; `row` gives those of one of the map's rows.
+fn read_map<'r>(chunks: &[Chunk], found: &mut Vec<u32>, row: impl Fn(usize) -> &'r [f32]) {
+    let places = chunks.iter().flat_map(|chunk| chunk.own.clone().map(|y| chunk.place(y)));
+    refill(found, places.flat_map(row).map(|number| *number as u32));
+}
+
 /// One computation.
 struct Job<'a> {
     isa: Isa,
@@ -155,10 +169,7 @@ pub(crate) fn compute(
     let reach = job.reach(limit);
     let rows = &rows[..swept * length];
     let per_chunk = chunks[0].own.len();
-    let sides = |y: usize| {
-        let chunk = &chunks[y / per_chunk];
-        sides(rows, width, chunk.start + y - chunk.swept.start)
-    };
+    let sides = |y: usize| sides(rows, width, chunks[y / per_chunk].place(y));
     let sink = Sink::new(normals, indices, width, listed)?;
     if job.tiles(workers, each, reach, limit, &sides, &sink).is_err() {
         let limit = job.largest_coordinate();
@@ -179,13 +190,7 @@ pub(crate) fn compute_with_sides(
 ) -> Result<(), Error> {
     compute(isa, points, options, None, normals, scratch)?;
     let width = points.width();
-    found.clear();
-    for Chunk { own, swept, start } in &scratch.chunks {
-        for y in own.clone() {
-            let row = sides(&scratch.rows, width, start + y - swept.start);
-            found.extend(row[..width].iter().map(|side| *side as u32));
-        }
-    }
+    read_map(&scratch.chunks, found, |place| &sides(&scratch.rows, width, place)[..width]);
     Ok(())
 }
 

@@ -1,6 +1,7 @@
 //! The organized cloud with its depths; every way of being missing has become NaN.
 
 use super::rect::Rect;
+use super::refill;
 use crate::cloud::Points;
 use crate::methods::is_finite;
 use crate::options::{Depth, Options, Semantics};
@@ -27,12 +28,10 @@ impl Cloud {
         (self.width, self.height) = (width, height);
         let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
-        self.points.clear();
-        self.points.extend(pixels.map(|(x, y)| cleaned.at(x, y)));
+        refill(&mut self.points, pixels.map(|(x, y)| cleaned.at(x, y)));
         let range = options.semantics == Semantics::Paper && options.paper.depth == Depth::Range;
         let depth = |&[x, y, z]: &[f32; 3]| if range { (x * x + y * y + z * z).sqrt() } else { z };
-        self.depths.clear();
-        self.depths.extend(self.points.iter().map(depth));
+        refill(&mut self.depths, self.points.iter().map(depth));
     }
 
     /// Bytes held.

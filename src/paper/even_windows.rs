@@ -66,9 +66,10 @@ pub(crate) struct Asked<'a> {
 }
 
 impl Asked<'_> {
-    /// The largest radius that a pixel's window may have.
+    /// The largest radius that a pixel's window may have: twice the wanted one, since whether a pixel is on one side
+    /// of a crease or on the other is told from less noise then.
     pub fn largest(&self, at: usize) -> u32 {
-        largest_radius(self.wanted[at], self.limit)
+        (2 * self.wanted[at]).min(self.limit)
     }
 
     /// The radii of the windows around the pixel that it can take.
@@ -93,12 +94,6 @@ impl Asked<'_> {
     pub fn least_noise(alpha: f32) -> f32 {
         (EVEN * alpha).powi(2)
     }
-}
-
-/// The largest radius of an even window where the depth asks for another one: twice that, since whether a pixel is on
-/// one side of a crease or on the other is told from less noise then.
-fn largest_radius(wanted: u32, limit: u32) -> u32 {
-    (2 * wanted).min(limit)
 }
 
 /// The even windows of the needed pixels, row by row: the plain form.

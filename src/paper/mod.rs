@@ -117,19 +117,20 @@ fn depth_changes(cloud: &Cloud, options: &Options) -> DepthChanges {
 fn is_depth_change(depth: f32, difference: f32, gap: usize, options: &Options) -> bool {
     match options.semantics {
         Semantics::Paper => smoothing_area::is_depth_change(depth, difference, gap, &options.paper),
-        Semantics::Pcl => {
-            let threshold = crate::depth_change::threshold(depth, options.max_depth_change_factor);
-            difference.abs() > threshold * gap as f32
-        }
+        Semantics::Pcl => difference.abs() > least_depth_change(depth, options) * gap as f32,
     }
+}
+
+/// Puts other values into a table that is kept from frame to frame.
+pub(crate) fn refill<T>(table: &mut Vec<T>, values: impl Iterator<Item = T>) {
+    table.clear();
+    table.extend(values);
 }
 
 /// The difference in depth between neighbours that is a depth change.
 fn least_depth_change(depth: f32, options: &Options) -> f32 {
     match options.semantics {
-        Semantics::Paper => {
-            options.paper.gamma * smoothing_area::smallest_depth_change(depth, &options.paper)
-        }
+        Semantics::Paper => smoothing_area::least_depth_change(depth, &options.paper),
         Semantics::Pcl => crate::depth_change::threshold(depth, options.max_depth_change_factor),
     }
 }

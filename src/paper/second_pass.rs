@@ -4,7 +4,9 @@ use super::cloud::Cloud;
 use super::creases::SummedNormals;
 use super::even_windows::{Asked, EvenWindow, EvenWindows};
 use super::rect::Rect;
-use super::{depth_changes, is_depth_change, rect_around, smoothing_area, surroundings, window};
+use super::{
+    depth_changes, is_depth_change, rect_around, refill, smoothing_area, surroundings, window,
+};
 use crate::Error;
 use crate::methods::Estimate;
 use crate::options::{Method, Options, Semantics};
@@ -159,11 +161,6 @@ impl SecondPass {
 /// Bytes that a table holds.
 fn bytes<T>(table: &Vec<T>) -> usize {
     table.capacity() * size_of::<T>()
-}
-
-fn refill<T>(table: &mut Vec<T>, values: impl Iterator<Item = T>) {
-    table.clear();
-    table.extend(values);
 }
 
 /// The size that the window of a pixel has far from any depth change, as [`Engine::windows`] gives them; 0 at a

@@ -15,7 +15,12 @@ pub(crate) fn is_depth_change(
     gap: usize,
     options: &PaperOptions,
 ) -> bool {
-    difference.abs() >= options.gamma * smallest_depth_change(depth, options) * gap as f32
+    difference.abs() >= least_depth_change(depth, options) * gap as f32
+}
+
+/// The least difference between neighbours that is a depth change: t_DC.
+pub(crate) fn least_depth_change(depth: f32, options: &PaperOptions) -> f32 {
+    options.gamma * smallest_depth_change(depth, options)
 }
 
 /// The radius that the depth asks for, in pixels: B (Eq. 5), within the limits; NaN at a missing point.

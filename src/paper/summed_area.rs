@@ -1,6 +1,9 @@
 //! Integral images (Eq. 1-3) of `N` channels.
 
+use std::iter::repeat_n;
+
 use super::rect::Rect;
+use super::refill;
 
 /// Sums over every rectangle from the image's first pixel, with a row and a column of zeros before it.
 #[derive(Debug, Default)]
@@ -13,12 +16,10 @@ impl<const N: usize> SummedArea<N> {
     /// Becomes the integral image of what `value` gives for every pixel number.
     pub fn sum_up(&mut self, width: usize, height: usize, value: impl Fn(usize) -> [f64; N]) {
         let stride = width + 1;
-        let SummedArea { stride: kept, sums } = self;
-        *kept = stride;
-        sums.clear();
-        sums.resize(stride * (height + 1), [0.0; N]);
+        self.stride = stride;
+        refill(&mut self.sums, repeat_n([0.0; N], stride * (height + 1)));
         for y in 0..height {
-            let (above, row) = sums[y * stride..].split_at_mut(stride);
+            let (above, row) = self.sums[y * stride..].split_at_mut(stride);
             let mut along = [0.0; N];
             for (x, (to, above)) in row[1..stride].iter_mut().zip(&above[1..]).enumerate() {
                 let value = value(y * width + x);

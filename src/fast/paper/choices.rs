@@ -58,7 +58,6 @@ struct Candidates<S: Simd> {
     inverse_depth: Floats<S>,
     slope: [Floats<S>; 2],
     unevenness: Floats<S>,
-    noise: Floats<S>,
     per_noise: Floats<S>,
     per_bend: Floats<S>,
 }
@@ -78,7 +77,7 @@ impl<S: Simd> Candidates<S> {
     unsafe fn none() -> Self {
         // SAFETY: as the caller's.
         let zero = unsafe { Floats::splat(0.0) };
-        let [short, inverse_depth, unevenness, noise, per_noise, per_bend] = [zero; 6];
+        let [short, inverse_depth, unevenness, per_noise, per_bend] = [zero; 5];
         let (places, lanes, to_pixel, slope) = ([0; GROUP], 0, [zero; 2], [zero; 2]);
         Candidates {
             places,
@@ -88,7 +87,6 @@ impl<S: Simd> Candidates<S> {
             inverse_depth,
             slope,
             unevenness,
-            noise,
             per_noise,
             per_bend,
         }
@@ -147,7 +145,6 @@ impl<S: Simd> Found<S> {
             to.inverse_depth = Floats(inverse_depth);
             to.slope = [Floats(across), Floats(down)];
             to.unevenness = Floats(unevenness);
-            to.noise = Floats(noise);
             to.per_noise = Floats(per_noise);
             to.per_bend = Floats(per_bend);
             let less = S::min(noise, self.noise.0);
@@ -171,6 +168,10 @@ impl Group<'_> {
         for (lane, levels) in levels.iter().enumerate() {
             lanes |= u32::from(*levels > 0) << lane;
         }
+        found.number = 0;
+        if lanes == 0 {
+            return;
+        }
         // Lanes outside the image stand for the last pixel of the row.
         let mut columns = [0; GROUP];
         let mut radii = [0; GROUP];
@@ -184,10 +185,6 @@ impl Group<'_> {
         // SAFETY: as the caller's; all places are inside the image.
         unsafe {
             let zero = Floats::splat(0.0);
-            found.number = 0;
-            if lanes == 0 {
-                return;
-            }
             found.noise = Floats::splat(f32::INFINITY);
             found.add(even.windows, places, [zero; 2], lanes);
             let row = Floats::<S>::splat(y as f32);

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::integrals::{Rings, reached, rows_of_rings};
 use super::methods::{CovarianceMatrix, MOMENTS};
-use super::rects::{Place, Rects, STEPS};
+use super::rects::{Place, Rects, STEPS, range};
 use crate::fast::Parts;
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::paper::{
@@ -266,8 +266,6 @@ impl EvenTile<'_> {
 #[inline(always)]
 unsafe fn side<S: Simd>(at: Floats<S>, radii: Floats<S>, count: usize) -> Floats<S> {
     // SAFETY: as the caller's.
-    unsafe {
-        let end = at + radii + Floats::splat(1.0);
-        Floats(S::min(end.0, S::splat(count as f32))) - (at - radii).max(Floats::splat(0.0))
-    }
+    let [start, end] = unsafe { range::<S>(at.0, radii.0, 0.0, count as f32) };
+    Floats(end) - Floats(start)
 }

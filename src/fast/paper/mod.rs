@@ -22,7 +22,7 @@ use windows::{Rows, Sweep, reach};
 
 use super::paths::{self, Task};
 use super::sink::Sink;
-use super::{Chunk, Parts, TILE_ROWS, lock, reserve, share_out};
+use super::{Chunk, Parts, TILE_ROWS, lock, read_map, reserve, share_out};
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
@@ -98,13 +98,8 @@ pub(crate) fn compute_with_radii(
 ) -> Result<(), Error> {
     compute(isa, points, options, None, normals, scratch)?;
     let length = row_length(points.width());
-    radii.clear();
-    for chunk in &scratch.chunks {
-        let first = chunk.start + chunk.own.start - chunk.swept.start;
-        let rows = scratch.paper.radii[first * length..].chunks(length).take(chunk.own.len());
-        radii
-            .extend(rows.flat_map(|row| row[..points.width()].iter().map(|radius| *radius as u32)));
-    }
+    let map = &scratch.paper.radii;
+    read_map(&scratch.chunks, radii, |place| &map[place * length..][..points.width()]);
     Ok(())
 }
 
@@ -171,7 +166,7 @@ pub(crate) fn choices(
     Ok(())
 }
 
-/// The image in tiles of like sizes, whose rings stay in the cache.
+/// The image in tiles of like sizes.
 struct Grid {
     width: usize,
     height: usize,
@@ -312,8 +307,7 @@ impl<'a> Job<'a> {
         let sink = Sink::new(normals, indices, width, listed)?;
         let (depths, radii, chunks) = (&paper.depths, &paper.radii, &*chunks);
         let row = |y: usize| {
-            let chunk = &chunks[y / chunks[0].own.len()];
-            let at = (chunk.start + y - chunk.swept.start) * length;
+            let at = chunks[y / chunks[0].own.len()].place(y) * length;
             (&depths[y * length..][..length], &radii[at..at + length])
         };
         let grid = Grid::new(width, height, largest, column(options.method));

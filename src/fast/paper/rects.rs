@@ -135,7 +135,7 @@ impl Rects {
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn range<S: Simd>(at: S::F, radii: S::F, first: f32, size: f32) -> [S::F; 2] {
+pub(crate) unsafe fn range<S: Simd>(at: S::F, radii: S::F, first: f32, size: f32) -> [S::F; 2] {
     // SAFETY: as the caller's.
     unsafe {
         let end = S::add(S::add(at, radii), S::splat(1.0));
