@@ -1,5 +1,7 @@
 //! The estimator: options and scratch memory, and the steps in their order.
 
+use std::iter::repeat_n;
+
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::depth_change::depth_change_map;
@@ -10,7 +12,8 @@ use crate::methods::{Estimate, covariance_matrix, estimate, estimate_window};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
 use crate::paper::{
-    self, Asked, Cloud, EvenWindow, EvenWindows, PaperMaps, SecondPass, refill, with_missing_as_nan,
+    self, Asked, Blocks, Cloud, EvenWindow, EvenWindows, PaperMaps, SecondPass, refill,
+    with_missing_as_nan,
 };
 use crate::smoothing_area::window_side;
 use crate::window::Image;
@@ -319,35 +322,40 @@ struct Engine<'a> {
 }
 
 impl Engine<'_> {
-    /// The estimates that `compute` writes.
+    /// The `width` x `height` estimates that `compute` writes.
     fn written(
         &mut self,
+        (width, height): (usize, usize),
         estimates: &mut Vec<[f32; 4]>,
         compute: impl FnOnce(Isa, &Points, &Options, &Normals, &mut Scratch) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        let (width, height) = (self.points.width(), self.points.height());
         estimates.resize(width * height, Estimate::NONE.into());
         let estimates = estimates.as_flattened_mut();
         let normals = Normals::interleaved(estimates, width, height, 4, 0, Some(3))?;
         compute(self.isa, self.points, self.options, &normals, self.scratch)
     }
 
-    /// The plain form's estimates of the pixels that have a window.
+    /// The plain form's estimates of these pixels, where there are some.
     fn plain(
         &self,
+        pixels: impl Iterator<Item = (usize, usize)>,
         estimates: &mut Vec<[f32; 4]>,
         estimate: impl Fn((usize, usize)) -> Option<Estimate>,
     ) {
-        let (width, height) = (self.points.width(), self.points.height());
-        let turned = |at: usize| {
-            let (x, y) = (at % width, at / width);
+        let turned = |(x, y): (usize, usize)| {
             estimate((x, y)).map_or(Estimate::NONE, |found| {
                 let point = self.points.at(x, y);
                 let normal = turn_to_viewpoint(found.normal, point, self.options.viewpoint);
                 Estimate { normal, ..found }
             })
         };
-        refill(estimates, (0..width * height).map(|at| turned(at).into()));
+        refill(estimates, pixels.map(|pixel| turned(pixel).into()));
+    }
+
+    /// The plain form's estimate of the paper's method from the window of a radius, if that is not 0.
+    fn of_radius(&self, pixel: (usize, usize), radius: u32) -> Option<Estimate> {
+        let of_radius = || paper::of_radius(self.points, self.options, pixel, radius as usize);
+        (radius > 0).then(of_radius)
     }
 }
 
@@ -358,24 +366,30 @@ impl paper::Engine for Engine<'_> {
         estimates: &mut Vec<[f32; 4]>,
     ) -> Result<(), Error> {
         let (width, height) = (self.points.width(), self.points.height());
+        let pixels = (0..width * height).map(|at| (at % width, at / width));
         if self.options.semantics == Semantics::Pcl {
             if !self.is_plain {
-                return self.written(estimates, |isa, points, options, normals, scratch| {
-                    fast::compute_with_sides(isa, points, options, normals, sizes, scratch)
-                });
+                return self.written(
+                    (width, height),
+                    estimates,
+                    |isa, points, options, normals, scratch| {
+                        fast::compute_with_sides(isa, points, options, normals, sizes, scratch)
+                    },
+                );
             }
             let plain = Plain::new(self.points, self.options);
             let side = |at: usize| plain.window_side(at % width, at / width);
             refill(sizes, (0..width * height).map(side));
-            self.plain(estimates, |(x, y)| Some(plain.estimate(x, y)));
+            self.plain(pixels, estimates, |(x, y)| Some(plain.estimate(x, y)));
             return Ok(());
         }
         if self.is_plain {
             let maps = PaperMaps::new(self.points, self.options);
             refill(sizes, maps.smoothing_radii.iter().map(|radius| *radius as u32));
-            return self.of_radii(sizes, estimates);
+            self.plain(pixels, estimates, |(x, y)| self.of_radius((x, y), sizes[y * width + x]));
+            return Ok(());
         }
-        self.written(estimates, |isa, points, options, normals, scratch| {
+        self.written((width, height), estimates, |isa, points, options, normals, scratch| {
             fast::paper::compute_with_radii(isa, points, options, normals, sizes, scratch)
         })
     }
@@ -395,30 +409,30 @@ impl paper::Engine for Engine<'_> {
         fast::paper::even_windows(self.isa, cloud, asked, needed, windows, threads, self.scratch)
     }
 
-    fn choices(
-        &mut self,
-        even: &EvenWindows,
-        choices: &mut Vec<Option<usize>>,
-    ) -> Result<(), Error> {
+    fn choices(&mut self, even: &EvenWindows, choices: &mut Vec<Option<u32>>) -> Result<(), Error> {
         if self.is_plain {
             refill(choices, even.choices());
             return Ok(());
         }
-        refill(choices, even.windows.iter().map(|_| None));
+        refill(choices, repeat_n(None, even.cloud.depths.len()));
         fast::paper::choices(self.isa, even, choices, self.options.threads, self.scratch)
     }
 
-    fn of_radii(&mut self, radii: &[u32], estimates: &mut Vec<[f32; 4]>) -> Result<(), Error> {
+    fn of_blocks(
+        &mut self,
+        blocks: &Blocks,
+        radii: &[u32],
+        estimates: &mut Vec<[f32; 4]>,
+    ) -> Result<(), Error> {
         if self.is_plain {
-            let width = self.points.width();
-            self.plain(estimates, |(x, y)| {
-                let radius = radii[y * width + x] as usize;
-                (radius > 0).then(|| paper::of_radius(self.points, self.options, (x, y), radius))
-            });
+            let pixels = (0..blocks.count()).map(|block| blocks.first(block));
+            let radius = |(x, y)| radii[blocks.block(y * self.points.width() + x)];
+            self.plain(pixels, estimates, |pixel| self.of_radius(pixel, radius(pixel)));
             return Ok(());
         }
-        self.written(estimates, |isa, points, options, normals, scratch| {
-            fast::paper::compute_of_radii(isa, points, options, radii, normals, scratch)
+        let size = (blocks.across, blocks.down);
+        self.written(size, estimates, |isa, points, options, normals, scratch| {
+            fast::paper::compute_of_blocks(isa, points, options, radii, normals, scratch)
         })
     }
 }

@@ -1,11 +1,13 @@
-//! Even windows: around every pixel the largest window whose points lie in one plane as well as chance allows.
+//! Even windows: around every block's first pixel the largest window whose points lie in one plane as well as chance
+//! allows.
 //!
 //! A pixel beside a depth change or a crease is in the middle of no large window that lies on one surface, but it is
-//! at the edge or in the corner of some, which are the even windows of pixels nearby. It takes the normal of the one
+//! at the edge or in the corner of some, which are the even windows of blocks nearby. It takes the normal of the one
 //! that is worth most to it: of that which leaves the smallest error in the slope of a plane through its points.
 //! Noise of variance v in n points leaves 12 v / (n L^2) in a window of side L; points that do not lie in the
 //! window's plane, or a pixel that does not, bend it by some share of their deviation over L.
 
+use super::blocks::{BLOCK, Blocks};
 use super::cloud::Cloud;
 use super::planes::{JITTER, Plane, inverse_depth};
 use super::rect::Rect;
@@ -33,13 +35,13 @@ pub(crate) const JAGGED_POINTS: f64 = 0.8;
 /// How many pixels beyond its window's edge a plane may be taken for a pixel's: outlines are ragged.
 pub(crate) const REACH: f32 = 3.0;
 
-/// A pixel's even window, and what it is worth.
+/// A block's even window, and what it is worth.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C)] // Eight floats, which the fast form reads as such.
 pub(crate) struct EvenWindow {
     /// A whole number; 0 for no window.
     pub radius: f32,
-    /// The plane's inverse depth at the pixel, and its change per pixel to the right and down.
+    /// The plane's inverse depth at the window's pixel, and its change per pixel to the right and down.
     pub inverse_depth: f32,
     pub slope: [f32; 2],
     /// The mean square deviation from the plane, and the variance that it may be of.
@@ -50,14 +52,15 @@ pub(crate) struct EvenWindow {
     pub per_bend: f32,
 }
 
-/// What windows are asked for, row by row.
+/// What windows are asked for.
 pub(crate) struct Asked<'a> {
-    /// The radius that the depth asks for, at most `limit`; 0 at a missing point.
+    pub blocks: Blocks,
+    /// The radius that the depth asks for, block by block, at most `limit`; 0 where all points are missing.
     pub wanted: &'a [u32],
-    /// From how many radii the windows come that the pixel can take, starting with the largest and halving it; 0 for a
-    /// pixel that takes none.
+    /// From how many radii the windows come that a block's pixels can take, starting with the largest and halving it,
+    /// block by block; 0 for a block that takes none.
     pub levels: &'a [u8],
-    /// The largest radius of a window without a depth change.
+    /// The largest radius of a window without a depth change, pixel by pixel.
     pub clean: &'a [u32],
     /// The largest radius of all.
     pub limit: u32,
@@ -66,26 +69,41 @@ pub(crate) struct Asked<'a> {
 }
 
 impl Asked<'_> {
-    /// The largest radius that a pixel's window may have: twice the wanted one, since whether a pixel is on one side
+    /// The largest radius that a block's window may have: twice the wanted one, since whether a pixel is on one side
     /// of a crease or on the other is told from less noise then.
-    pub fn largest(&self, at: usize) -> u32 {
-        (2 * self.wanted[at]).min(self.limit)
+    pub fn largest(&self, block: usize) -> u32 {
+        (2 * self.wanted[block]).min(self.limit)
     }
 
-    /// The radii of the windows around the pixel that it can take.
-    pub fn radii(&self, at: usize) -> impl Iterator<Item = u32> + use<> {
-        let (largest, levels) = (self.largest(at), u32::from(self.levels[at]));
+    /// The radii of the windows around the block that its pixels can take.
+    fn radii(&self, block: usize) -> impl Iterator<Item = u32> + use<> {
+        let (largest, levels) = (self.largest(block), u32::from(self.levels[block]));
         (0..levels).map(move |level| largest >> level).take_while(|radius| *radius > 0)
     }
 
-    /// Whether some pixel can take a pixel's window, row by row.
-    pub fn needed(&self, width: usize, height: usize) -> Vec<bool> {
-        let mut needed = vec![false; width * height];
-        for at in (0..width * height).filter(|at| self.levels[*at] > 0) {
-            let pixel = (at % width, at / width);
-            for_each_place(pixel, (width, height), self.radii(at), |dx, dy| {
-                needed[at.wrapping_add_signed(dy * width as isize + dx)] = true;
-            });
+    /// Calls `visit` with the blocks whose windows a block's pixels can take: itself, and those one radius away along
+    /// the rows, the columns and both.
+    fn for_each_place(&self, block: usize, mut visit: impl FnMut(usize)) {
+        let Blocks { across, down, .. } = self.blocks;
+        let (x, y) = (block % across, block / across);
+        visit(block);
+        for radius in self.radii(block) {
+            let (left, right) = places(x, radius as usize, across);
+            let (up, down) = places(y, radius as usize, down);
+            // Of windows that are worth the same, the one at the middle of an edge is nearer.
+            let edges = [(left, y), (right, y), (x, up), (x, down)];
+            let corners = [(left, up), (right, up), (left, down), (right, down)];
+            for (x, y) in edges.into_iter().chain(corners) {
+                visit(y * across + x);
+            }
+        }
+    }
+
+    /// Whether some pixel can take a block's window, block by block.
+    pub fn needed(&self) -> Vec<bool> {
+        let mut needed = vec![false; self.blocks.count()];
+        for block in (0..needed.len()).filter(|block| self.levels[*block] > 0) {
+            self.for_each_place(block, |place| needed[place] = true);
         }
         needed
     }
@@ -96,22 +114,28 @@ impl Asked<'_> {
     }
 }
 
-/// The even windows of the needed pixels, row by row: the plain form.
+/// The columns or rows of blocks, of so many, before and behind block `at` at the places of windows of a radius.
+#[inline(always)]
+pub(crate) fn places(at: usize, radius: usize, count: usize) -> (usize, usize) {
+    let distance = radius.div_ceil(BLOCK);
+    (at.saturating_sub(distance), (at + distance).min(count - 1))
+}
+
+/// The even windows of the needed blocks: the plain form.
 pub(crate) fn even_windows<'a>(
     cloud: &'a Cloud,
     asked: &'a Asked,
     needed: &'a [bool],
 ) -> impl Iterator<Item = EvenWindow> + 'a {
-    let pixels = (0..cloud.height).flat_map(move |y| (0..cloud.width).map(move |x| (x, y)));
-    let window = move |(pixel, needed): (_, &bool)| {
-        needed.then(|| even_window(cloud, asked, pixel)).flatten().unwrap_or_default()
+    let window = move |(block, needed): (_, &bool)| {
+        needed.then(|| even_window(cloud, asked, block)).flatten().unwrap_or_default()
     };
-    pixels.zip(needed).map(window)
+    needed.iter().enumerate().map(window)
 }
 
-fn even_window(cloud: &Cloud, asked: &Asked, pixel: (usize, usize)) -> Option<EvenWindow> {
-    let at = cloud.index(pixel.0, pixel.1);
-    let (wanted, clean) = (asked.wanted[at], asked.clean[at]);
+fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<EvenWindow> {
+    let pixel = asked.blocks.first(block);
+    let (wanted, clean) = (asked.wanted[block], asked.clean[cloud.index(pixel.0, pixel.1)]);
     let rect = |radius: u32| Rect::around(pixel, radius as usize, (cloud.width, cloud.height));
     let plane = |radius: u32| Plane::of(cloud, &rect(radius));
     let jagged = |radius: u32| {
@@ -127,7 +151,7 @@ fn even_window(cloud: &Cloud, asked: &Asked, pixel: (usize, usize)) -> Option<Ev
         plane.unevenness * f64::from(1.0 + CHANCE * chance)
     };
     let (radius, plane) = radii.find_map(jagged).or_else(|| {
-        let mut radius = asked.largest(at).min(clean);
+        let mut radius = asked.largest(block).min(clean);
         let mut found = plane(radius)?;
         while radius > 1
             && let Some(half) = plane(radius / 2)
@@ -162,47 +186,57 @@ pub(crate) struct EvenWindows<'a> {
     pub cloud: &'a Cloud,
     pub asked: &'a Asked<'a>,
     pub options: &'a Options,
-    /// Row by row.
+    /// Block by block.
     pub windows: &'a [EvenWindow],
 }
 
 impl EvenWindows<'_> {
-    /// The radius of a pixel's window; 0 for none.
-    pub fn radius(&self, at: usize) -> u32 {
-        self.windows[at].radius as u32
+    /// The radius of a block's window; 0 for none.
+    pub fn radius(&self, block: usize) -> u32 {
+        self.windows[block].radius as u32
     }
 
-    /// The pixel whose window each pixel takes, if there is one: the plain form.
-    pub fn choices(&self) -> impl Iterator<Item = Option<usize>> {
-        let choice = |at: usize| (self.asked.levels[at] > 0).then(|| self.best(at)).flatten();
-        (0..self.windows.len()).map(choice)
+    /// The block whose window each pixel takes, if there is one: the plain form.
+    pub fn choices(&self) -> impl Iterator<Item = Option<u32>> {
+        let can_take = |pixel: usize| {
+            self.asked.levels[self.asked.blocks.block(pixel)] > 0 && !self.cloud.is_missing(pixel)
+        };
+        let choice = move |pixel: usize| can_take(pixel).then(|| self.best(pixel)).flatten();
+        (0..self.cloud.depths.len()).map(choice)
     }
 
-    /// The pixel whose window is worth most to a pixel, among itself and those at the places of the windows that it
+    /// The block whose window is worth most to a pixel, among its own and those at the places of the windows that it
     /// can take; none if there is none. Windows that end short of the pixel are taken if its point, or in inverse depth
     /// one within the tolerance of it, lies in their plane.
-    fn best(&self, own: usize) -> Option<usize> {
+    fn best(&self, own: usize) -> Option<u32> {
         let cloud = self.cloud;
-        let pixel = (own % cloud.width, own / cloud.width);
+        let blocks = &self.asked.blocks;
+        let way = |from: (usize, usize), to: (usize, usize)| {
+            [to.0 as f32 - from.0 as f32, to.1 as f32 - from.1 as f32]
+        };
+        let distance = |[dx, dy]: [f32; 2]| dx.abs().max(dy.abs());
+        let block = blocks.block(own);
+        let first = blocks.first(block);
         let mut noise = f32::INFINITY;
         let mut found = Vec::new();
-        for_each_place(pixel, (cloud.width, cloud.height), self.asked.radii(own), |dx, dy| {
-            let at = own.wrapping_add_signed(dy * cloud.width as isize + dx);
-            let window = &self.windows[at];
-            let distance = dx.unsigned_abs().max(dy.unsigned_abs()) as f32;
+        self.asked.for_each_place(block, |place| {
+            let window = &self.windows[place];
+            let distance = distance(way(blocks.first(place), first));
             if window.radius > 0.0 && distance <= window.radius + REACH {
                 noise = noise.min(window.noise);
-                let short = (distance - window.radius).max(0.0);
-                found.push(Candidate { at, to_pixel: [-dx as f32, -dy as f32], short });
+                found.push(place);
             }
         });
 
         let noise = noise.max(self.asked.least_noise);
+        let pixel = (own % cloud.width, own / cloud.width);
         let near = self.near(pixel);
         let (point, tolerance) = (inverse_depth(cloud.depths[own]), self.tolerance(own));
         let mut best: Option<(f32, usize)> = None;
-        for Candidate { at, to_pixel: [dx, dy], short } in found {
-            let window = &self.windows[at];
+        for place in found {
+            let window = &self.windows[place];
+            let [dx, dy] = way(blocks.first(place), pixel);
+            let short = (distance([dx, dy]) - window.radius).max(0.0);
             let least = best.map_or(f32::INFINITY, |(least, _)| least);
             let far = 1.0 + short * short;
             let at_pixel = |x: f32, y: f32| {
@@ -217,10 +251,10 @@ impl EvenWindows<'_> {
             let steepness = || (across * across + down * down).sqrt();
             let lies_in = || (point - at_pixel(0.0, 0.0)).abs() < tolerance + JITTER * steepness();
             if cost < least && (short == 0.0 || lies_in()) {
-                best = Some((cost, at));
+                best = Some((cost, place));
             }
         }
-        best.map(|(_, at)| at)
+        best.map(|(_, place)| place as u32)
     }
 
     /// How far from a plane a pixel's point may lie to be on that surface, in inverse depth: half a depth change.
@@ -247,41 +281,6 @@ impl EvenWindows<'_> {
         let [inverse_depth, dx, dy] = sums.map(|sum| sum / points);
         Near { inverse_depth, offset: [dx, dy], points }
     }
-}
-
-/// Calls `visit` with the ways in columns and rows from a pixel to those whose windows it can take: itself, and those at
-/// the places of windows of these radii.
-fn for_each_place(
-    (x, y): (usize, usize),
-    (width, height): (usize, usize),
-    radii: impl Iterator<Item = u32>,
-    mut visit: impl FnMut(isize, isize),
-) {
-    let step = |from: usize, step: isize, size: usize| {
-        from.saturating_add_signed(step).min(size - 1) as isize - from as isize
-    };
-    visit(0, 0);
-    for radius in radii {
-        let radius = radius as isize;
-        let (left, right) = (step(x, -radius, width), step(x, radius, width));
-        let (up, down) = (step(y, -radius, height), step(y, radius, height));
-        // Of windows that are worth the same, the one at the middle of an edge is nearer.
-        let edges = [(left, 0), (right, 0), (0, up), (0, down)];
-        let corners = [(left, up), (right, up), (left, down), (right, down)];
-        for places in [edges, corners] {
-            for (dx, dy) in places {
-                visit(dx, dy);
-            }
-        }
-    }
-}
-
-/// A window that a pixel can take: that of the pixel `at`, from which `to_pixel` leads to this one.
-struct Candidate {
-    at: usize,
-    to_pixel: [f32; 2],
-    /// How many pixels the window ends short of this one.
-    short: f32,
 }
 
 /// The mean inverse depth of points next to a pixel, their number, and the mean of their places from there.

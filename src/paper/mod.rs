@@ -4,6 +4,7 @@
 //! One file per step, in its plain form. What the steps share is that a pixel's window is a rectangle inside the
 //! image, and that a method turns the points in a rectangle into a normal.
 
+mod blocks;
 mod cloud;
 mod creases;
 mod depth_change;
@@ -17,10 +18,11 @@ pub(crate) mod smoothing_area;
 mod summed_area;
 mod surroundings;
 
+pub(crate) use blocks::{BLOCK, Blocks};
 pub(crate) use cloud::{CleanPoints, Cleaned, Cloud};
 pub(crate) use even_windows::{
     Asked, CHANCE, EvenWindow, EvenWindows, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, MISFIT, NEAR,
-    NEAR_NOISE, REACH, even_windows,
+    NEAR_NOISE, REACH, even_windows, places,
 };
 pub(crate) use methods::estimate as plain_estimate;
 pub(crate) use planes::{JITTER, Plane, inverse_depth};

@@ -1,5 +1,8 @@
 //! The second pass: normals near depth changes and near creases, from even windows.
 
+use std::iter::repeat_n;
+
+use super::blocks::Blocks;
 use super::cloud::Cloud;
 use super::creases::SummedNormals;
 use super::even_windows::{Asked, EvenWindow, EvenWindows};
@@ -19,7 +22,7 @@ pub(crate) trait Engine {
     fn windows(&mut self, sizes: &mut Vec<u32>, estimates: &mut Vec<[f32; 4]>)
     -> Result<(), Error>;
 
-    /// The even windows of the needed pixels.
+    /// The even windows of the needed blocks.
     fn even_windows(
         &mut self,
         cloud: &Cloud,
@@ -28,31 +31,32 @@ pub(crate) trait Engine {
         windows: &mut Vec<EvenWindow>,
     ) -> Result<(), Error>;
 
-    /// The pixel whose window each pixel takes, if there is one.
-    fn choices(
-        &mut self,
-        even: &EvenWindows,
-        choices: &mut Vec<Option<usize>>,
-    ) -> Result<(), Error>;
+    /// The block whose window each pixel takes, if there is one.
+    fn choices(&mut self, even: &EvenWindows, choices: &mut Vec<Option<u32>>) -> Result<(), Error>;
 
-    /// The estimates of other windows, for the pixels that have one, by their radii.
-    fn of_radii(&mut self, radii: &[u32], estimates: &mut Vec<[f32; 4]>) -> Result<(), Error>;
+    /// The estimates of windows around blocks' first pixels, for the blocks that have one, by their radii.
+    fn of_blocks(
+        &mut self,
+        blocks: &Blocks,
+        radii: &[u32],
+        estimates: &mut Vec<[f32; 4]>,
+    ) -> Result<(), Error>;
 }
 
 /// The tables of the image, kept from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct SecondPass {
-    /// Of the first pass; then as they should be.
-    estimates: Vec<[f32; 4]>,
-    /// The first pass' windows, and those far from any depth change.
+    /// The first pass' windows and estimates; those then as they should be.
     sizes: Vec<u32>,
-    wanted: Vec<u32>,
-    /// As [`Asked`] has them.
-    radii: Vec<u32>,
-    levels: Vec<u8>,
+    estimates: Vec<[f32; 4]>,
     normals: SummedNormals,
+    /// The pixels that another window may serve better than their own.
+    concerned: Vec<bool>,
+    /// As [`Asked`] has them.
+    wanted: Vec<u32>,
+    levels: Vec<u8>,
     windows: Vec<EvenWindow>,
-    choices: Vec<Option<usize>>,
+    choices: Vec<Option<u32>>,
     /// The radii of the windows that some pixel takes, and their estimates.
     taken: Vec<u32>,
     second: Vec<[f32; 4]>,
@@ -67,12 +71,12 @@ const CREASE_LEVELS: u8 = 2;
 impl SecondPass {
     /// Bytes held.
     pub fn size(&self) -> usize {
-        bytes(&self.estimates)
-            + bytes(&self.sizes)
-            + bytes(&self.wanted)
-            + bytes(&self.radii)
-            + bytes(&self.levels)
+        bytes(&self.sizes)
+            + bytes(&self.estimates)
             + self.normals.size()
+            + bytes(&self.concerned)
+            + bytes(&self.wanted)
+            + bytes(&self.levels)
             + bytes(&self.windows)
             + bytes(&self.choices)
             + bytes(&self.taken)
@@ -92,53 +96,61 @@ impl SecondPass {
             return Ok(&self.estimates);
         }
         let limit = options.paper.largest_radius;
-        self.concern(cloud, options, limit);
-        let SecondPass { radii, levels, windows, choices, taken, second, .. } = self;
+        let blocks = Blocks::of(cloud.width, cloud.height);
+        self.concern(cloud, &blocks, options, limit);
+        let SecondPass { wanted, levels, windows, choices, taken, second, .. } = self;
         let clean = depth_changes(cloud, options).not_explained(cloud).clean_radii();
         let least_noise = Asked::least_noise(options.paper.alpha);
-        let asked = Asked { wanted: radii, levels, clean: &clean, limit, least_noise };
-        engine.even_windows(cloud, &asked, &asked.needed(cloud.width, cloud.height), windows)?;
+        let asked = Asked { blocks, wanted, levels, clean: &clean, limit, least_noise };
+        engine.even_windows(cloud, &asked, &asked.needed(), windows)?;
         let even = EvenWindows { cloud, asked: &asked, options, windows };
         engine.choices(&even, choices)?;
-        refill(taken, choices.iter().map(|_| 0));
-        for other in choices.iter().flatten() {
-            taken[*other] = even.radius(*other);
+        refill(taken, repeat_n(0, blocks.count()));
+        for block in choices.iter().flatten().map(|block| *block as usize) {
+            taken[block] = even.radius(block);
         }
-        engine.of_radii(taken, second)?;
+        engine.of_blocks(&blocks, taken, second)?;
         self.replace(cloud, options);
         Ok(&self.estimates)
     }
 
-    /// Finds the pixels that another pixel's window may serve better than their own.
-    fn concern(&mut self, cloud: &Cloud, options: &Options, limit: u32) {
-        let SecondPass { estimates, sizes, wanted, radii, levels, normals, .. } = self;
-        let pixels = 0..cloud.width * cloud.height;
-        refill(wanted, pixels.clone().map(|at| wanted_size(cloud, options, at)));
-        refill(radii, wanted.iter().map(|size| radius_of_size(*size, options).min(limit)));
+    /// Finds the pixels that another window may serve better than their own.
+    fn concern(&mut self, cloud: &Cloud, blocks: &Blocks, options: &Options, limit: u32) {
+        let SecondPass { estimates, sizes, wanted, concerned, levels, normals, .. } = self;
         if options.crease_windows {
             normals.sum(estimates, cloud.width, cloud.height);
         }
-        let levels_of = |at: usize| {
-            let is_near_crease = || {
-                let window = || window_of_size(cloud, options, at, sizes[at]);
-                options.crease_windows && sizes[at] > 0 && normals.vary_in(&window())
+        refill(concerned, repeat_n(false, sizes.len()));
+        wanted.clear();
+        levels.clear();
+        for block in 0..blocks.count() {
+            let has_window = |at: usize| sizes[at] > 0 && !cloud.is_missing(at);
+            let normals_vary = |at: usize| {
+                has_window(at) && normals.vary_in(&window_of_size(cloud, options, at, sizes[at]))
             };
-            if options.one_sided_windows && sizes[at] < wanted[at] {
-                EVERY_LEVEL
-            } else if !cloud.is_missing(at) && is_near_crease() {
-                CREASE_LEVELS
-            } else {
-                0
+            let is_near_crease = options.crease_windows && blocks.pixels(block).any(normals_vary);
+            let (mut largest, mut level) = (0, 0);
+            for at in blocks.pixels(block) {
+                let size = wanted_size(cloud, options, at);
+                largest = size.max(largest);
+                if options.one_sided_windows && sizes[at] < size {
+                    concerned[at] = true;
+                    level = EVERY_LEVEL;
+                } else if is_near_crease && has_window(at) {
+                    concerned[at] = true;
+                    level = CREASE_LEVELS.max(level);
+                }
             }
-        };
-        refill(levels, pixels.map(levels_of));
+            wanted.push(radius_of_size(largest, options).min(limit));
+            levels.push(level);
+        }
     }
 
     /// Gives the pixels concerned the estimates of the windows that they take.
     fn replace(&mut self, cloud: &Cloud, options: &Options) {
-        let SecondPass { estimates, levels, choices, second, .. } = self;
-        for at in (0..estimates.len()).filter(|at| levels[*at] > 0) {
-            let found = choices[at].map(|other| second[other]).filter(|found| !found[0].is_nan());
+        let SecondPass { estimates, concerned, choices, second, .. } = self;
+        for at in (0..estimates.len()).filter(|at| concerned[*at]) {
+            let found = choices[at].map(|block| second[block as usize]);
             let around = || {
                 let pixel = (at % cloud.width, at / cloud.width);
                 let same = |depth: f32, difference: f32, distance: usize| {
@@ -147,7 +159,8 @@ impl SecondPass {
                 let has_none = options.one_sided_windows && estimates[at][0].is_nan();
                 has_none.then(|| surroundings::plane_around(cloud, pixel, same)).flatten()
             };
-            if let Some(found) = found.map(Estimate::from).or_else(around) {
+            let found = found.filter(|found| !found[0].is_nan()).map(Estimate::from);
+            if let Some(found) = found.or_else(around) {
                 let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
                 estimates[at] = Estimate { normal, ..found }.into();
             }

@@ -1,60 +1,63 @@
-//! Which even window each pixel takes, fast, for one row of the image: the plain form is in `paper::even_windows`. The
-//! windows at one place of eight pixels are gathered and weighed together.
+//! Which even window each pixel takes, fast, for one row of blocks: the plain form is in `paper::even_windows`. The
+//! windows at one place of eight blocks are gathered together, and weighed for a pixel of each at a time.
 
-use super::rects::STEPS;
 use crate::fast::arithmetic::Floats;
 use crate::fast::tile::Bits;
 use crate::paper::{
-    Cloud, EvenWindow, EvenWindows, JITTER, MISFIT, NEAR, NEAR_NOISE, REACH, inverse_depth,
+    BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, JITTER, MISFIT, NEAR, NEAR_NOISE, REACH,
+    inverse_depth, places,
 };
 use crate::simd::{GROUP, Simd};
 
-/// Columns and rows of the places around a pixel, 0 before it, 1 its own, 2 behind it, in the plain form's order.
+/// Columns and rows of the places around a block, 0 before it, 1 its own, 2 behind it, in the plain form's order.
 const PLACES: [(usize, usize); 8] =
     [(0, 1), (2, 1), (1, 0), (1, 2), (0, 0), (2, 0), (0, 2), (2, 2)];
 
-/// Finds the choices of row `y`.
+/// Finds the choices of the pixels of a row of blocks, which are none so far.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-pub(super) unsafe fn row<S: Simd>(even: &EvenWindows, y: usize, choices: &mut [Option<usize>]) {
-    let neighbours = Neighbours::new(even.cloud, y);
+pub(super) unsafe fn row<S: Simd>(even: &EvenWindows, row: usize, choices: &mut [Option<u32>]) {
+    let neighbours = Neighbours::new(even.cloud, row);
     // SAFETY: as the caller's.
     let noise = unsafe { Floats::<S>::splat(0.0) };
     let mut found = Found { candidates: Vec::new(), number: 0, noise };
-    for x in (0..choices.len()).step_by(GROUP) {
-        let choices = &mut choices[x..];
-        let count = choices.len().min(GROUP);
-        let group = Group { even, x, y, count };
+    let across = even.asked.blocks.across;
+    for first in (0..across).step_by(GROUP) {
+        let group = Group { even, row, first, count: (across - first).min(GROUP) };
         // SAFETY: as the caller's.
         unsafe {
             group.candidates(&mut found);
             if found.number > 0 {
-                let near = neighbours.near(&group);
-                group.choose(&found, &near, &mut choices[..count]);
+                for (y, choices) in choices.chunks_mut(even.cloud.width).enumerate() {
+                    for x in 0..BLOCK {
+                        group.choose(&found, &neighbours, [x, y], choices);
+                    }
+                }
             }
         }
     }
 }
 
-/// Eight pixels of a row, of which the first `count` are inside the image.
+/// Eight blocks of a row, of which `count` are inside the image.
 struct Group<'a> {
     even: &'a EvenWindows<'a>,
-    x: usize,
-    y: usize,
+    row: usize,
+    /// The first block's column.
+    first: usize,
     count: usize,
 }
 
-/// Windows that eight pixels may take, one each.
+/// Windows that the pixels of eight blocks may take, one each.
 struct Candidates<S: Simd> {
-    /// The pixels whose windows they are.
-    places: [usize; GROUP],
+    /// The blocks whose windows they are.
+    places: [u32; GROUP],
     /// Which of the eight may take theirs.
     lanes: u32,
-    to_pixel: [Floats<S>; 2],
-    /// How many pixels the windows end short of the eight.
-    short: Floats<S>,
+    /// The ways from the windows' pixels to the eight blocks' first.
+    to_first: [Floats<S>; 2],
+    radius: Floats<S>,
     inverse_depth: Floats<S>,
     slope: [Floats<S>; 2],
     unevenness: Floats<S>,
@@ -77,13 +80,13 @@ impl<S: Simd> Candidates<S> {
     unsafe fn none() -> Self {
         // SAFETY: as the caller's.
         let zero = unsafe { Floats::splat(0.0) };
-        let [short, inverse_depth, unevenness, per_noise, per_bend] = [zero; 5];
-        let (places, lanes, to_pixel, slope) = ([0; GROUP], 0, [zero; 2], [zero; 2]);
+        let [radius, inverse_depth, unevenness, per_noise, per_bend] = [zero; 5];
+        let (places, lanes, to_first, slope) = ([0; GROUP], 0, [zero; 2], [zero; 2]);
         Candidates {
             places,
             lanes,
-            to_pixel,
-            short,
+            to_first,
+            radius,
             inverse_depth,
             slope,
             unevenness,
@@ -93,7 +96,7 @@ impl<S: Simd> Candidates<S> {
     }
 }
 
-/// The windows that eight pixels may take.
+/// The windows that the pixels of eight blocks may take.
 struct Found<S: Simd> {
     /// Only so many mean something.
     candidates: Vec<Candidates<S>>,
@@ -103,7 +106,7 @@ struct Found<S: Simd> {
 }
 
 impl<S: Simd> Found<S> {
-    /// Adds the windows at places from which `to_pixel` leads to the pixels of these `lanes`.
+    /// Adds the windows of the blocks at places from which `to_first` leads to those of these `lanes`.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`; the places are inside the image.
@@ -111,12 +114,12 @@ impl<S: Simd> Found<S> {
     unsafe fn add(
         &mut self,
         windows: &[EvenWindow],
-        places: [usize; GROUP],
-        to_pixel: [Floats<S>; 2],
+        places: [u32; GROUP],
+        to_first: [Floats<S>; 2],
         lanes: u32,
     ) {
         const { assert!(size_of::<EvenWindow>() == 8 * size_of::<f32>()) };
-        debug_assert!(places.iter().all(|place| *place < windows.len()));
+        debug_assert!(places.iter().all(|place| (*place as usize) < windows.len()));
         let windows = windows.as_ptr().cast::<f32>();
         if self.number == self.candidates.len() {
             // SAFETY: as the caller's.
@@ -128,7 +131,8 @@ impl<S: Simd> Found<S> {
         unsafe {
             let (mut front, mut back) = ([S::splat(0.0); 4], [S::splat(0.0); 4]);
             for i in 0..4 {
-                let (low, high) = (windows.add(8 * places[i]), windows.add(8 * places[i + 4]));
+                let at = |lane: usize| windows.add(8 * places[lane] as usize);
+                let (low, high) = (at(i), at(i + 4));
                 front[i] = S::load_halves(low, high);
                 back[i] = S::load_halves(low.add(4), high.add(4));
             }
@@ -136,12 +140,12 @@ impl<S: Simd> Found<S> {
             let [unevenness, noise, per_noise, per_bend] = S::transpose_halves(back);
             let zero = Floats::splat(0.0);
             let radius = Floats(radius);
-            let distance = to_pixel[0].abs().max(to_pixel[1].abs());
+            let distance = to_first[0].abs().max(to_first[1].abs());
             let near = distance.lt(radius + Floats::splat(REACH + 1.0));
             to.places = places;
             to.lanes = lanes & zero.lt(radius) & near;
-            to.to_pixel = to_pixel;
-            to.short = (distance - radius).max(zero);
+            to.to_first = to_first;
+            to.radius = radius;
             to.inverse_depth = Floats(inverse_depth);
             to.slope = [Floats(across), Floats(down)];
             to.unevenness = Floats(unevenness);
@@ -154,16 +158,16 @@ impl<S: Simd> Found<S> {
 }
 
 impl Group<'_> {
-    /// Finds the windows that the pixels may take.
+    /// Finds the windows that the blocks' pixels may take.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn candidates<S: Simd>(&self, found: &mut Found<S>) {
-        let &Group { even, x, y, count } = self;
-        let &Cloud { width, height, .. } = even.cloud;
-        let first = y * width + x;
-        let levels = &even.asked.levels[first..first + count];
+        let &Group { even, row, first, count } = self;
+        let Blocks { across, down, .. } = even.asked.blocks;
+        let own = row * across + first;
+        let levels = &even.asked.levels[own..own + count];
         let mut lanes = 0;
         for (lane, levels) in levels.iter().enumerate() {
             lanes |= u32::from(*levels > 0) << lane;
@@ -172,25 +176,21 @@ impl Group<'_> {
         if lanes == 0 {
             return;
         }
-        // Lanes outside the image stand for the last pixel of the row.
+        // Lanes outside the image stand for the last block of the row.
         let mut columns = [0; GROUP];
         let mut radii = [0; GROUP];
         for (lane, column) in columns.iter_mut().enumerate() {
-            *column = (x + lane).min(width - 1);
+            *column = (first + lane).min(across - 1);
         }
         for lane in Bits(lanes) {
-            radii[lane] = even.asked.largest(first + lane) as usize;
+            radii[lane] = even.asked.largest(own + lane) as usize;
         }
-        let places = columns.map(|column| y * width + column);
+        let mut at_columns = [columns; 3];
+        let mut at_rows = [[row; GROUP]; 3];
         // SAFETY: as the caller's; all places are inside the image.
         unsafe {
-            let zero = Floats::splat(0.0);
             found.noise = Floats::splat(f32::INFINITY);
-            found.add(even.windows, places, [zero; 2], lanes);
-            let row = Floats::<S>::splat(y as f32);
-            let last = Floats::<S>::splat((width - 1) as f32);
-            let column = Floats::<S>(S::load(STEPS.as_ptr())) + Floats::splat(x as f32);
-            let column = Floats(S::min(column.0, last.0));
+            self.add(found, [&columns; 2], [&[row; GROUP]; 2], lanes);
             for level in 0.. {
                 let mut active = 0;
                 for lane in Bits(lanes) {
@@ -200,26 +200,15 @@ impl Group<'_> {
                 if active == 0 {
                     break;
                 }
-                let mut at_columns = [columns; 3];
-                let mut at_rows = [[y * width; GROUP]; 3];
-                let mut lengths = [0.0; GROUP];
                 for lane in 0..GROUP {
-                    let (left, right) = around(columns[lane], radii[lane], width);
-                    let (up, down) = around(y, radii[lane], height);
+                    let (left, right) = places(columns[lane], radii[lane], across);
+                    let (up, down) = places(row, radii[lane], down);
                     (at_columns[0][lane], at_columns[2][lane]) = (left, right);
-                    (at_rows[0][lane], at_rows[2][lane]) = (up * width, down * width);
-                    lengths[lane] = radii[lane] as f32;
+                    (at_rows[0][lane], at_rows[2][lane]) = (up, down);
                 }
-                let lengths = Floats(S::load(lengths.as_ptr()));
-                let to_columns = ways(column, lengths, width);
-                let to_rows = ways(row, lengths, height);
                 for (column, row) in PLACES {
-                    let mut places = [0; GROUP];
-                    for lane in 0..GROUP {
-                        places[lane] = at_rows[row][lane] + at_columns[column][lane];
-                    }
-                    let to_pixel = [to_columns[column], to_rows[row]];
-                    found.add(even.windows, places, to_pixel, active);
+                    let at_columns = [&columns, &at_columns[column]];
+                    self.add(found, at_columns, [&at_rows[1], &at_rows[row]], active);
                 }
                 for radius in &mut radii {
                     *radius /= 2;
@@ -228,7 +217,29 @@ impl Group<'_> {
         }
     }
 
-    /// Of the windows `found`, those that are worth most to the pixels.
+    /// Adds the windows at places of these `lanes`' blocks: columns and rows of blocks, the eight's own first.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`; the places are inside the image.
+    #[inline(always)]
+    unsafe fn add<S: Simd>(
+        &self,
+        found: &mut Found<S>,
+        columns: [&[usize; GROUP]; 2],
+        rows: [&[usize; GROUP]; 2],
+        lanes: u32,
+    ) {
+        let mut places = [0; GROUP];
+        for lane in 0..GROUP {
+            places[lane] =
+                (rows[1][lane] * self.even.asked.blocks.across + columns[1][lane]) as u32;
+        }
+        // SAFETY: as the caller's.
+        unsafe { found.add(self.even.windows, places, [ways(columns), ways(rows)], lanes) };
+    }
+
+    /// Of the windows `found`, those that are worth most to the blocks' pixels in this column and row of theirs, for
+    /// the choices of that row.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
@@ -236,17 +247,26 @@ impl Group<'_> {
     unsafe fn choose<S: Simd>(
         &self,
         found: &Found<S>,
-        near: &Near<S>,
-        choices: &mut [Option<usize>],
+        neighbours: &Neighbours,
+        [column, row]: [usize; 2],
+        choices: &mut [Option<u32>],
     ) {
-        let first = self.y * self.even.cloud.width + self.x;
+        let cloud = self.even.cloud;
+        let x = self.first * BLOCK + column;
+        let pixels = (self.row * BLOCK + row) * cloud.width + x;
         let mut tolerances = [0.0; GROUP];
-        for (lane, tolerance) in tolerances[..self.count].iter_mut().enumerate() {
-            *tolerance = self.even.tolerance(first + lane);
+        let (mut there, mut clean) = (0, 0);
+        for lane in (0..self.count).take_while(|lane| x + lane * BLOCK < cloud.width) {
+            let pixel = pixels + lane * BLOCK;
+            there |= u32::from(!cloud.is_missing(pixel)) << lane;
+            clean |= u32::from(self.even.asked.clean[pixel] > 0) << lane;
+            tolerances[lane] = self.even.tolerance(pixel);
         }
         // SAFETY: as the caller's.
         unsafe {
+            let near = neighbours.near::<S>(self.first, [column, row], clean);
             let (zero, one) = (Floats::splat(0.0), Floats::splat(1.0));
+            let [column, row] = [column, row].map(|at| Floats::splat(at as f32));
             let tolerance = Floats(S::load(tolerances.as_ptr()));
             let noise = found.noise.max(Floats::splat(self.even.asked.least_noise));
             let near_noise = Floats::splat(NEAR_NOISE) * noise / near.points;
@@ -254,9 +274,11 @@ impl Group<'_> {
             let mut best = S::splat(-1.0);
             let found = &found.candidates[..found.number];
             for (number, candidates) in found.iter().enumerate() {
-                let [dx, dy] = candidates.to_pixel;
+                let [dx, dy] = candidates.to_first;
+                let (dx, dy) = (dx + column, dy + row);
                 let [across, down] = candidates.slope;
-                let far = one + candidates.short * candidates.short;
+                let short = (dx.abs().max(dy.abs()) - candidates.radius).max(zero);
+                let far = one + short * short;
                 let at_near = candidates.inverse_depth
                     + across * (dx + near.offset[0])
                     + down * (dy + near.offset[1]);
@@ -269,81 +291,76 @@ impl Group<'_> {
                 let steepness = (across * across + down * down).sqrt();
                 let limit = tolerance + Floats::splat(JITTER) * steepness;
                 let lies_in = (near.own - at_pixel).abs().lt(limit);
-                let can_take = candidates.lanes & (lies_in | !zero.lt(candidates.short));
+                let can_take = candidates.lanes & (lies_in | !zero.lt(short));
                 let better = S::mask(cost.lt(least) & can_take);
                 least.0 = S::select(better, cost.0, least.0);
                 best = S::select(better, S::splat(number as f32), best);
             }
             let mut numbers = [0; GROUP];
             S::store_i(numbers.as_mut_ptr(), S::truncate_i(best));
-            for ((lane, number), choice) in numbers.into_iter().enumerate().zip(choices) {
-                *choice = found.get(number as usize).map(|candidates| candidates.places[lane]);
+            for lane in Bits(there) {
+                let best = found.get(numbers[lane] as usize);
+                choices[x + lane * BLOCK] = best.map(|candidates| candidates.places[lane]);
             }
         }
     }
 }
 
-/// The columns or rows, of so many, that a window reaches.
-#[inline(always)]
-fn around(at: usize, radius: usize, count: usize) -> (usize, usize) {
-    (at.saturating_sub(radius), (at + radius).min(count - 1))
-}
-
-/// The ways back from the first column or row, of so many, that windows reach around `at`, from `at` itself and from the
-/// last.
+/// The ways in pixels from the second of these columns or rows of blocks to the first.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn ways<S: Simd>(at: Floats<S>, radii: Floats<S>, count: usize) -> [Floats<S>; 3] {
-    // SAFETY: as the caller's.
-    unsafe {
-        let zero = Floats::splat(0.0);
-        let rest = Floats::splat((count - 1) as f32) - at;
-        [Floats(S::min(radii.0, at.0)), zero, zero - Floats(S::min(radii.0, rest.0))]
+unsafe fn ways<S: Simd>([to, from]: [&[usize; GROUP]; 2]) -> Floats<S> {
+    let mut ways = [0.0; GROUP];
+    for lane in 0..GROUP {
+        ways[lane] = (to[lane] as f32 - from[lane] as f32) * BLOCK as f32;
     }
+    // SAFETY: as the caller's.
+    Floats(unsafe { S::load(ways.as_ptr()) })
 }
 
-/// The inverse depths of a row and those above and below.
+/// The inverse depths of a row of blocks, and of the pixels' rows above and below.
 struct Neighbours {
-    /// Element i + 1 of a row is the i-th column's; NaN outside the image.
-    inverse_depths: [Vec<f32>; 3],
+    /// Row by row, for every column of blocks: element i + 1 is the i-th block's; NaN outside the image.
+    inverse_depths: [[Vec<f32>; BLOCK]; BLOCK + 2],
 }
 
 impl Neighbours {
-    fn new(cloud: &Cloud, y: usize) -> Self {
-        let length = cloud.width.next_multiple_of(GROUP) + 2;
-        let mut inverse_depths = [const { Vec::new() }; 3];
-        for (row, inverse_depths) in (y..y + 3).zip(&mut inverse_depths) {
-            *inverse_depths = vec![f32::NAN; length];
-            if (1..=cloud.height).contains(&row) {
-                let depths = &cloud.depths[(row - 1) * cloud.width..row * cloud.width];
-                for (to, depth) in inverse_depths[1..].iter_mut().zip(depths) {
-                    *to = inverse_depth(*depth);
+    fn new(cloud: &Cloud, row: usize) -> Self {
+        let length = cloud.width.div_ceil(BLOCK).next_multiple_of(GROUP) + 2;
+        let inverse_depths = std::array::from_fn(|line| {
+            let mut columns = std::array::from_fn(|_| vec![f32::NAN; length]);
+            let y = (row * BLOCK + line).wrapping_sub(1);
+            if y < cloud.height {
+                let depths = &cloud.depths[y * cloud.width..(y + 1) * cloud.width];
+                for (x, depth) in depths.iter().enumerate() {
+                    columns[x % BLOCK][x / BLOCK + 1] = inverse_depth(*depth);
                 }
             }
-        }
+            columns
+        });
         Neighbours { inverse_depths }
     }
 
+    /// Of the points next to those in a column and row of eight blocks from column `first` on; around pixels that are
+    /// not `clean`, of these alone.
+    ///
     /// # Safety
-    /// The processor has the instruction set of `S`; the group is of this row.
+    /// The processor has the instruction set of `S`; the blocks are inside the image but for those that make up eight.
     #[inline(always)]
-    unsafe fn near<S: Simd>(&self, group: &Group) -> Near<S> {
-        let first = group.y * group.even.cloud.width + group.x;
-        let mut clean = 0;
-        for (lane, radius) in group.even.asked.clean[first..first + group.count].iter().enumerate()
-        {
-            clean |= u32::from(*radius > 0) << lane;
-        }
-        // SAFETY: as the caller's; rows hold whole groups, and an element before and behind.
+    unsafe fn near<S: Simd>(&self, first: usize, [column, row]: [usize; 2], clean: u32) -> Near<S> {
+        // SAFETY: as the caller's; columns hold whole groups, and an element before and behind.
         unsafe {
             let zero = Floats::<S>::splat(0.0);
             let (mut sum, mut offset, mut points) = (zero, [zero; 2], zero);
             let mut own = zero;
-            for (row, dy) in self.inverse_depths.iter().zip([-1.0, 0.0, 1.0]) {
-                for (column, dx) in (group.x..group.x + 3).zip([-1.0, 0.0, 1.0]) {
-                    let inverse = S::load(row.as_ptr().add(column));
+            for (line, dy) in self.inverse_depths[row..row + 3].iter().zip([-1.0, 0.0, 1.0]) {
+                for (way, dx) in [-1.0, 0.0, 1.0].into_iter().enumerate() {
+                    // Counted from the block before.
+                    let at = BLOCK + column + way - 1;
+                    let column = &line[at % BLOCK];
+                    let inverse = S::load(column.as_ptr().add(first + at / BLOCK));
                     let mut there = S::eq(inverse, inverse);
                     if dx == 0.0 && dy == 0.0 {
                         own = Floats(inverse);

@@ -9,18 +9,17 @@ use super::rects::{Place, Rects, STEPS, range};
 use crate::fast::Parts;
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::paper::{
-    Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, Plane, inverse_depth,
+    Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, Plane,
+    inverse_depth,
 };
 use crate::simd::{GROUP, Simd};
 
-/// A rectangle of the image whose even windows are found together.
+/// A rectangle of the image whose blocks' even windows are found together.
 pub(super) struct EvenTile<'a> {
-    /// Row by row, as `asked` is.
-    pub depths: &'a [f32],
+    pub cloud: &'a Cloud,
     pub asked: &'a Asked<'a>,
+    /// Block by block.
     pub needed: &'a [bool],
-    pub width: usize,
-    pub height: usize,
     pub columns: Range<usize>,
     pub rows: Range<usize>,
     /// The largest radius of a window.
@@ -90,32 +89,33 @@ impl<S: Simd> Fits<S> {
 }
 
 impl EvenTile<'_> {
-    /// Writes the windows, row by row, to the image that they are part of.
+    /// Writes the windows to those of the image's blocks.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`; no one else writes the tile's pixels.
+    /// The processor has the instruction set of `S`; no one else writes the tile's blocks.
     #[inline(always)]
-    pub unsafe fn compute<S: Simd>(&self, rings: &mut Rings<MOMENTS>, image: &Parts<EvenWindow>) {
+    pub unsafe fn compute<S: Simd>(&self, rings: &mut Rings<MOMENTS>, windows: &Parts<EvenWindow>) {
         let reach = self.largest;
-        let columns = reached(&self.columns, reach, self.width);
-        let Range { start: top, end: bottom } = reached(&self.rows, reach, self.height);
+        let &Cloud { width, height, ref depths, .. } = self.cloud;
+        let columns = reached(&self.columns, reach, width);
+        let Range { start: top, end: bottom } = reached(&self.rows, reach, height);
         let moments =
             CovarianceMatrix { origin: [columns.start as f32, top as f32, self.origin()] };
-        rings.start(columns, top, rows_of_rings(reach, self.height));
+        rings.start(columns, top, rows_of_rings(reach, height));
         let mut next = top;
-        for y in self.rows.clone() {
+        for y in self.rows.clone().step_by(BLOCK) {
             while next < (y + reach + 1).min(bottom) {
-                rings.read_positions(&self.depths[next * self.width..], next);
+                rings.read_positions(&depths[next * width..], next);
                 rings.push(&moments, next);
                 next += 1;
             }
-            for x in self.columns.clone().step_by(GROUP) {
-                let first = y * self.width + x;
-                let count = (self.columns.end - x).min(GROUP);
+            for x in self.columns.clone().step_by(GROUP * BLOCK) {
+                let block = self.asked.blocks.block(y * width + x);
+                let blocks = block..block + (self.columns.end - x).div_ceil(BLOCK).min(GROUP);
                 // SAFETY: as the caller's.
                 unsafe {
-                    let windows = self.eight::<S>(rings, &moments, (x, y), count);
-                    image.part(first..first + count).copy_from_slice(&windows[..count]);
+                    let found = self.eight::<S>(rings, &moments, (x, y), blocks.clone());
+                    windows.part(blocks.clone()).copy_from_slice(&found[..blocks.len()]);
                 }
             }
         }
@@ -123,12 +123,13 @@ impl EvenTile<'_> {
 
     /// An inverse depth of the tile: sums about it lose less.
     fn origin(&self) -> f32 {
-        let row = |y: usize| &self.depths[y * self.width..][self.columns.clone()];
+        let &Cloud { width, ref depths, .. } = self.cloud;
+        let row = |y: usize| &depths[y * width..][self.columns.clone()];
         let inverse = self.rows.clone().flat_map(row).map(|depth| inverse_depth(*depth));
         inverse.into_iter().find(|r| !r.is_nan()).unwrap_or(0.0)
     }
 
-    /// The windows of eight pixels, of which only the first `count` mean something.
+    /// The windows of at most eight blocks, from that of pixel `first` on.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`; the rings hold what the windows need.
@@ -138,15 +139,15 @@ impl EvenTile<'_> {
         rings: &Rings<MOMENTS>,
         moments: &CovarianceMatrix,
         pixel: (usize, usize),
-        count: usize,
+        blocks: Range<usize>,
     ) -> [EvenWindow; GROUP] {
-        let first = pixel.1 * self.width + pixel.0;
+        let first = self.cloud.index(pixel.0, pixel.1);
         let [mut wanted, mut clean, mut largest] = [[0.0; GROUP]; 3];
-        for lane in 0..count {
-            if self.needed[first + lane] {
-                wanted[lane] = self.asked.wanted[first + lane] as f32;
-                clean[lane] = self.asked.clean[first + lane] as f32;
-                largest[lane] = (self.asked.largest(first + lane) as f32).min(clean[lane]);
+        for (lane, block) in blocks.enumerate() {
+            if self.needed[block] {
+                wanted[lane] = self.asked.wanted[block] as f32;
+                clean[lane] = self.asked.clean[first + lane * BLOCK] as f32;
+                largest[lane] = (self.asked.largest(block) as f32).min(clean[lane]);
             }
         }
         // SAFETY: as the caller's.
@@ -201,7 +202,8 @@ impl EvenTile<'_> {
         lanes: u32,
     ) -> (Fits<S>, u32) {
         let (left, stride, rows) = (rings.left(), rings.stride(), rings.rows);
-        let place = Place { image: [self.width, self.height], x, y, left, stride, rows };
+        let image = [self.cloud.width, self.cloud.height];
+        let place = Place { image, x, y, step: BLOCK, left, stride, rows };
         let (_, sums) = rings.parts();
         // SAFETY: as the caller's.
         unsafe {
@@ -223,7 +225,7 @@ impl EvenTile<'_> {
             let chance = Floats::splat(1.0) + Floats::splat(CHANCE) * chance.sqrt();
             let noise = unevenness * chance.widen();
             // The pixels' own positions.
-            let column = (Floats(S::load(STEPS.as_ptr())) + Floats::splat(x as f32)).widen();
+            let column = columns::<S>(x).widen();
             let [left, top, origin] = moments.origin.map(|o| Doubles::splat(f64::from(o)));
             let across = column - left - mx;
             let down = Doubles::splat(y as f64) - top - my;
@@ -249,13 +251,25 @@ impl EvenTile<'_> {
         let [a, b] = fits.slope;
         // SAFETY: as the caller's.
         unsafe {
-            let column = Floats(S::load(STEPS.as_ptr())) + Floats::splat(x as f32);
             let row = Floats::splat(y as f32);
-            let area = side(column, radii, self.width) * side(row, radii, self.height);
+            let &Cloud { width, height, .. } = self.cloud;
+            let area = side(columns(x), radii, width) * side(row, radii, height);
             let limit = Doubles::splat(JAGGED * JAGGED) * (a * a + b * b);
             let fewest = Doubles::splat(JAGGED_POINTS) * area.widen();
             !limit.lt(fits.unevenness) & !fits.points.lt(fewest)
         }
+    }
+}
+
+/// The columns of eight blocks' first pixels, from column `x` on.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn columns<S: Simd>(x: usize) -> Floats<S> {
+    // SAFETY: as the caller's.
+    unsafe {
+        Floats(S::load(STEPS.as_ptr())) * Floats::splat(BLOCK as f32) + Floats::splat(x as f32)
     }
 }
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 use crate::cloud::Points;
 use crate::fast::lanes::transpose4;
 use crate::fast::planes::grow;
-use crate::paper::inverse_depth;
+use crate::paper::{BLOCK, inverse_depth};
 use crate::simd::{GROUP, Simd};
 
 /// x, y, z, and 1; zeros for a missing point.
@@ -66,7 +66,7 @@ impl<const N: usize> Rings<N> {
     pub fn start(&mut self, columns: Range<usize>, top: usize, rows: usize) {
         (self.columns, self.largest, self.rows) = (columns, 0.0, rows);
         let length = self.rows * self.stride();
-        grow(&mut self.points, length + GROUP);
+        grow(&mut self.points, length + BLOCK * GROUP);
         self.points[..length].fill([0.0; 4]);
         if self.sums.len() < length {
             self.sums.resize(length, [0.0; N]);
@@ -100,11 +100,11 @@ impl<const N: usize> Rings<N> {
         (&self.points[..length], &self.sums[..length])
     }
 
-    /// The eight points of row `y` from column `x` on; those behind the last column mean nothing.
+    /// The points of row `y` from column `x` on, room for `BLOCK` groups; those behind the last column mean nothing.
     #[inline(always)]
-    pub fn eight(&self, x: usize, y: usize) -> &[Counted; GROUP] {
+    pub fn from(&self, x: usize, y: usize) -> &[Counted; BLOCK * GROUP] {
         let first = self.row(y).start + x - self.columns.start + 1;
-        self.points[first..].first_chunk().expect("a group of room behind the last row")
+        self.points[first..].first_chunk().expect("room behind the last row")
     }
 
     /// Reads row `y` of the points, of which `depths` says which are missing. `whole_points` as

@@ -27,7 +27,7 @@ use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::options::{DistanceMetric, Method, Options};
-use crate::paper::{Asked, Cloud, EvenWindow, EvenWindows, PaperMaps};
+use crate::paper::{Asked, BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, PaperMaps};
 use crate::simd::{GROUP, Simd};
 
 /// Elements of a tile's rings at most: floats hold their indices. Room for the largest windows there are.
@@ -84,7 +84,7 @@ pub(crate) fn compute(
     let job = Job::new(isa, points, options, normals);
     job.depths(scratch)?;
     let largest = job.radii(scratch)?;
-    job.tiles(scratch, indices, normals, largest)
+    job.tiles(scratch, indices, normals, largest, 1)
 }
 
 /// The radii of all pixels' windows, row by row, 0 for none, and their normals.
@@ -103,8 +103,8 @@ pub(crate) fn compute_with_radii(
     Ok(())
 }
 
-/// The normals of the pixels that have a window of one of these radii, row by row; NaN for the others.
-pub(crate) fn compute_of_radii(
+/// The normals of the blocks whose first pixel has a window of one of these radii; NaN for the others.
+pub(crate) fn compute_of_blocks(
     isa: Isa,
     points: &Points,
     options: &Options,
@@ -115,10 +115,10 @@ pub(crate) fn compute_of_radii(
     let job = Job::new(isa, points, options, normals);
     job.depths(scratch)?;
     let largest = job.given_radii(scratch, radii)?;
-    job.tiles(scratch, None, normals, largest)
+    job.tiles(scratch, None, normals, largest, BLOCK)
 }
 
-/// The even windows of the needed pixels, row by row.
+/// The even windows of the needed blocks.
 pub(crate) fn even_windows(
     isa: Isa,
     cloud: &Cloud,
@@ -130,38 +130,43 @@ pub(crate) fn even_windows(
 ) -> Result<(), Error> {
     scratch.prepare(threads)?;
     let super::Scratch { workers, each, .. } = scratch;
-    let &Cloud { width, height, ref depths, .. } = cloud;
-    windows.resize(width * height, EvenWindow::default());
-    let image = Parts(windows.as_mut_ptr());
-    let radius = |at: usize| asked.largest(at).min(asked.clean[at]).max(asked.wanted[at]);
-    let largest = (0..width * height).map(radius).max().unwrap_or(0) as usize;
-    let grid = Grid::new(width, height, largest, Rings::<MOMENTS>::COLUMN);
+    let blocks = &asked.blocks;
+    windows.resize(blocks.count(), EvenWindow::default());
+    let parts = Parts(windows.as_mut_ptr());
+    let radius = |block: usize| {
+        let (x, y) = blocks.first(block);
+        asked.largest(block).min(asked.clean[cloud.index(x, y)]).max(asked.wanted[block])
+    };
+    let needed_blocks = (0..blocks.count()).filter(|block| needed[*block]);
+    let largest = needed_blocks.map(radius).max().unwrap_or(0) as usize;
+    let grid = Grid::new(cloud.width, cloud.height, largest, Rings::<MOMENTS>::COLUMN);
     workers.for_each(grid.count(), |worker, item| {
         let Some((columns, rows)) = grid.tile(item) else { return };
-        let tile = EvenTile { depths, asked, needed, width, height, columns, rows, largest };
+        let tile = EvenTile { cloud, asked, needed, columns, rows, largest };
         let rings = &mut lock(&each[worker]).paper.moments;
         // SAFETY: the processor has the instruction set, and tiles do not share pixels.
-        unsafe { paths::run(isa, EvenTask { tile: &tile, rings, image: &image }) };
+        unsafe { paths::run(isa, EvenTask { tile: &tile, rings, windows: &parts }) };
     });
     Ok(())
 }
 
-/// The pixel whose even window each pixel takes, if there is one.
+/// The block whose even window each pixel takes, if there is one.
 pub(crate) fn choices(
     isa: Isa,
     even: &EvenWindows,
-    choices: &mut [Option<usize>],
+    choices: &mut [Option<u32>],
     threads: usize,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
     scratch.prepare(threads)?;
     let &Cloud { width, height, .. } = even.cloud;
     let parts = Parts(choices.as_mut_ptr());
-    scratch.workers.for_each(height, |_, y| {
-        // SAFETY: rows do not overlap.
-        let row = unsafe { parts.part(y * width..(y + 1) * width) };
+    scratch.workers.for_each(even.asked.blocks.down, |_, row| {
+        let rows = row * BLOCK..((row + 1) * BLOCK).min(height);
+        // SAFETY: rows of blocks do not overlap.
+        let choices = unsafe { parts.part(rows.start * width..rows.end * width) };
         // SAFETY: the processor has the instruction set.
-        unsafe { paths::run(isa, ChoicesTask { even, y, row }) };
+        unsafe { paths::run(isa, ChoicesTask { even, row, choices }) };
     });
     Ok(())
 }
@@ -184,20 +189,22 @@ impl Grid {
         let columns = (RING_BYTES / (column * ring)).max(4 * largest);
         let columns = columns.min(MOST_INDICES / ring - 2 * largest - 4 * GROUP);
         let across = width.div_ceil(columns.next_multiple_of(GROUP));
-        let columns = width.div_ceil(across).next_multiple_of(GROUP);
+        let columns = width.div_ceil(across).next_multiple_of(BLOCK * GROUP);
         let down = height.div_ceil(TILE_ROWS);
-        Grid { width, height, columns, rows: height.div_ceil(down), across, down }
+        let rows = height.div_ceil(down).next_multiple_of(BLOCK);
+        Grid { width, height, columns, rows, across, down }
     }
 
     fn count(&self) -> usize {
         self.across * self.down
     }
 
-    /// The columns and rows of a tile; none where the tiles before have covered all.
+    /// The columns and rows of a tile, which start with a block; none where the tiles before have covered all.
     fn tile(&self, item: usize) -> Option<(Range<usize>, Range<usize>)> {
         let (row, column) = (item / self.across * self.rows, item % self.across * self.columns);
         let columns = column..(column + self.columns).min(self.width);
-        (column < self.width).then(|| (columns, row..(row + self.rows).min(self.height)))
+        let rows = row..(row + self.rows).min(self.height);
+        (!columns.is_empty() && !rows.is_empty()).then_some((columns, rows))
     }
 }
 
@@ -276,14 +283,14 @@ impl<'a> Job<'a> {
         Ok(largest.into_inner() as usize)
     }
 
-    /// As [`Job::radii`], of radii that are there.
+    /// As [`Job::radii`], of radii of blocks that are there.
     fn given_radii(&self, scratch: &mut super::Scratch, given: &[u32]) -> Result<usize, Error> {
         let super::Scratch { chunks, paper, .. } = scratch;
-        let (width, height) = (self.points.width(), self.points.height());
-        let length = row_length(width);
-        share_out(height, 1, height, chunks);
-        reserve(&mut paper.radii, height * length, 0.0)?;
-        for (to, from) in paper.radii.chunks_mut(length).zip(given.chunks(width)) {
+        let Blocks { across, down, .. } = Blocks::of(self.points.width(), self.points.height());
+        let length = row_length(across);
+        share_out(down, 1, down, chunks);
+        reserve(&mut paper.radii, down * length, 0.0)?;
+        for (to, from) in paper.radii.chunks_mut(length).zip(given.chunks(across)) {
             for (to, from) in to.iter_mut().zip(from) {
                 *to = *from as f32;
             }
@@ -291,7 +298,7 @@ impl<'a> Job<'a> {
         Ok(given.iter().max().map_or(0, |largest| *largest as usize))
     }
 
-    /// The normals, tile by tile; no window's radius is above `largest`.
+    /// The normals of every `step`-th pixel of every `step`-th row, tile by tile; no window's radius is above `largest`.
     #[inline(never)]
     fn tiles(
         &self,
@@ -299,21 +306,23 @@ impl<'a> Job<'a> {
         indices: Option<&[i32]>,
         normals: &Normals,
         largest: usize,
+        step: usize,
     ) -> Result<(), Error> {
         let &Job { points, options, whole_points, .. } = self;
         let super::Scratch { workers, each, listed, chunks, paper, .. } = scratch;
         let (width, height) = (points.width(), points.height());
-        let length = row_length(width);
+        let [length, radii_length] = [width, width.div_ceil(step)].map(row_length);
         let sink = Sink::new(normals, indices, width, listed)?;
         let (depths, radii, chunks) = (&paper.depths, &paper.radii, &*chunks);
         let row = |y: usize| {
-            let at = chunks[y / chunks[0].own.len()].place(y) * length;
-            (&depths[y * length..][..length], &radii[at..at + length])
+            let row = y / step;
+            let at = chunks[row / chunks[0].own.len()].place(row) * radii_length;
+            (&depths[y * length..][..length], &radii[at..at + radii_length])
         };
         let grid = Grid::new(width, height, largest, column(options.method));
         workers.for_each(grid.count(), |worker, item| {
             let Some((columns, rows)) = grid.tile(item) else { return };
-            let tile = Tile { points, options, columns, rows, whole_points, largest, row };
+            let tile = Tile { points, options, columns, rows, whole_points, largest, step, row };
             let scratch = &mut lock(&each[worker]).paper;
             // SAFETY: the processor has the instruction set, and tiles do not share pixels.
             unsafe { paths::run(self.isa, TileTask { tile: &tile, scratch, sink: &sink }) };
@@ -406,7 +415,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Task for TileTask<'a, '_, F> {
 struct EvenTask<'a, 't> {
     tile: &'t EvenTile<'a>,
     rings: &'t mut Rings<MOMENTS>,
-    image: &'t Parts<EvenWindow>,
+    windows: &'t Parts<EvenWindow>,
 }
 
 impl Task for EvenTask<'_, '_> {
@@ -415,15 +424,15 @@ impl Task for EvenTask<'_, '_> {
     #[inline(always)]
     unsafe fn run<S: Simd>(self) {
         // SAFETY: as the caller's.
-        unsafe { self.tile.compute::<S>(self.rings, self.image) };
+        unsafe { self.tile.compute::<S>(self.rings, self.windows) };
     }
 }
 
-/// The choices of one row's pixels.
+/// The choices of the pixels of one row of blocks.
 struct ChoicesTask<'a> {
     even: &'a EvenWindows<'a>,
-    y: usize,
-    row: &'a mut [Option<usize>],
+    row: usize,
+    choices: &'a mut [Option<u32>],
 }
 
 impl Task for ChoicesTask<'_> {
@@ -432,6 +441,6 @@ impl Task for ChoicesTask<'_> {
     #[inline(always)]
     unsafe fn run<S: Simd>(self) {
         // SAFETY: as the caller's.
-        unsafe { choices::row::<S>(self.even, self.y, self.row) };
+        unsafe { choices::row::<S>(self.even, self.row, self.choices) };
     }
 }

@@ -11,9 +11,10 @@ type Indices = [i32; GROUP];
 pub(crate) struct Place {
     /// Width and height of the image.
     pub image: [usize; 2],
-    /// The first pixel of the eight.
+    /// The first pixel of the eight, and how many columns they are apart.
     pub x: usize,
     pub y: usize,
+    pub step: usize,
     /// The rings' first column, their elements from a row to the next, and their rows.
     pub left: usize,
     pub stride: usize,
@@ -48,7 +49,10 @@ impl Rects {
         // SAFETY: as the caller's; floats hold indices exactly.
         unsafe {
             let (zero, one) = (S::splat(0.0), S::splat(1.0));
-            let at = S::add(S::load(STEPS.as_ptr()), S::splat((place.x - place.left) as f32));
+            let steps = S::mul(S::load(STEPS.as_ptr()), S::splat(place.step as f32));
+            let at = S::add(steps, S::splat((place.x - place.left) as f32));
+            // Pixels behind the last column stand for that.
+            let at = S::min(at, S::splat((place.image[0] - 1 - place.left) as f32));
             let x = range::<S>(at, radii, -(place.left as f32), place.image[0] as f32);
             let y = range::<S>(zero, radii, -(place.y as f32), place.image[1] as f32);
             let edge = if inner { one } else { zero };

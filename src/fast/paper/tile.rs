@@ -15,9 +15,6 @@ use crate::orientation::turn_to_viewpoint;
 use crate::paper::{CleanPoints, Cleaned, Rect, plain_estimate, window};
 use crate::simd::{GROUP, Simd};
 
-/// The places of eight points in a row.
-const FIRST: [i32; GROUP] = [0, 1, 2, 3, 4, 5, 6, 7];
-
 /// A rectangle of the image whose normals are computed together.
 pub(crate) struct Tile<'a, F> {
     pub points: &'a Points<'a>,
@@ -27,7 +24,11 @@ pub(crate) struct Tile<'a, F> {
     pub whole_points: bool,
     /// How far a window reaches from its pixel at most.
     pub largest: usize,
-    /// A row's depths, and the radii of its windows, 0 for none; both can be read up to a whole group.
+    /// Normals are of every so-manieth pixel of every so-manieth row, from the tile's first on, which is of one in the
+    /// image; at most `BLOCK`.
+    pub step: usize,
+    /// A row's depths, and the radii of its windows, 0 for none, if it has normals; both can be read up to a whole
+    /// group.
     pub row: F,
 }
 
@@ -50,7 +51,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         // SAFETY: as the caller's.
         unsafe { rings.read::<S>(self.points, (self.row)(top).0, top, self.whole_points) };
         let mut next = top;
-        for y in self.rows.clone() {
+        for y in self.rows.clone().step_by(self.step) {
             while next < (y + reach + 1).min(bottom) {
                 if next + 1 < height {
                     let depths = (self.row)(next + 1).0;
@@ -93,18 +94,25 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let (left, stride, rows) = (rings.left(), rings.stride(), rings.rows);
         let (points, sums) = rings.parts();
         let radii = (self.row)(y).1;
-        let rect = |x: usize| window((x, y), radii[x] as usize, image[0], image[1]);
+        let step = self.step;
+        let mut steps = [0; GROUP];
+        for (lane, to) in steps.iter_mut().enumerate() {
+            *to = (lane * step) as i32;
+        }
         let cleaned =
             Cleaned { points: self.points, zero_is_missing: self.options.zero_is_missing };
-        for x in self.columns.clone().step_by(GROUP) {
-            let count = (self.columns.end - x).min(GROUP);
-            let place = Place { image, x, y, left, stride, rows };
+        for x in self.columns.clone().step_by(GROUP * step) {
+            let count = (self.columns.end - x).div_ceil(step).min(GROUP);
+            let place = Place { image, x, y, step, left, stride, rows };
+            let radii = &radii[x / step..];
+            let pixel = |lane: usize| (x + lane * step, y);
+            let rect = |lane: usize| window(pixel(lane), radii[lane] as usize, image[0], image[1]);
             // SAFETY: as the caller's; the rings hold what the windows of the tile's pixels need.
             unsafe {
-                let eight = S::load(radii.as_ptr().add(x));
+                let eight = S::load(radii.as_ptr());
                 let windows = S::bits(S::lt(S::splat(0.0), eight)) & ((1 << count) - 1);
                 if windows == 0 {
-                    sink.write_none(x, y, count);
+                    sink.write_none(x / step, y / step, count);
                     continue;
                 }
                 // Behind the last column radii mean nothing.
@@ -116,7 +124,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                     let found = M::normals(&sums, &rects, points, error, windows, fresh);
                     let mut tried = 0;
                     for lane in Bits(found.doubtful & windows & !fresh) {
-                        if let Some(one) = M::afresh(&cleaned, &rect(x + lane)) {
+                        if let Some(one) = M::afresh(&cleaned, &rect(lane)) {
                             for (sum, one) in sums.iter_mut().zip(one) {
                                 sum.0 = S::select_bits_d(1 << lane, S::splat_d(one), sum.0);
                             }
@@ -129,16 +137,15 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                     fresh |= tried;
                 };
                 let plain = found.doubtful & windows;
-                let [px, py, pz, _] = gather::<S>(rings.eight(x, y), &FIRST);
+                let [px, py, pz, _] = gather::<S>(rings.from(x, y), &steps);
                 let viewpoint = self.options.viewpoint;
                 let (sure, here) = (windows & !plain, [px, py, pz]);
                 let mut normals =
                     Octet::of::<S>(found.normal, found.curvature, here, viewpoint, sure);
                 for lane in Bits(plain) {
-                    let rect = rect(x + lane);
-                    normals.put(lane, self.plain(&cleaned, (x + lane, y), &rect));
+                    normals.put(lane, self.plain(&cleaned, pixel(lane), &rect(lane)));
                 }
-                sink.write(x, y, count, &normals, M::CURVATURE);
+                sink.write(x / step, y / step, count, &normals, M::CURVATURE);
             }
         }
     }
