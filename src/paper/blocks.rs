@@ -27,12 +27,12 @@ impl Blocks {
         (block % self.across * BLOCK, block / self.across * BLOCK)
     }
 
-    /// The numbers of a block's pixels.
-    pub fn pixels(&self, block: usize) -> impl Iterator<Item = usize> + use<> {
-        let Blocks { width, height, .. } = *self;
-        let (x, y) = self.first(block);
-        let rows = y..(y + BLOCK).min(height);
-        rows.flat_map(move |y| y * width + x..y * width + (x + BLOCK).min(width))
+    /// The numbers of a block's pixels; the last ones inside the image stand for those that are cut off.
+    #[inline(always)]
+    pub fn pixels(&self, (column, row): (usize, usize)) -> [usize; BLOCK * BLOCK] {
+        let x = |at: usize| (column * BLOCK + at % BLOCK).min(self.width - 1);
+        let y = |at: usize| (row * BLOCK + at / BLOCK).min(self.height - 1);
+        std::array::from_fn(|at| y(at) * self.width + x(at))
     }
 
     /// The block that a pixel is in.

@@ -1,9 +1,10 @@
 //! Where the first pass' normals vary strongly: near edges without a depth change.
 
+use super::blocks::{BLOCK, Blocks};
 use super::rect::Rect;
 use super::summed_area::SummedArea;
 
-/// Integral images of the first pass' normals.
+/// Integral images of the first pass' normals, block by block.
 #[derive(Debug, Default)]
 pub(crate) struct SummedNormals {
     sums: SummedArea<4>,
@@ -11,10 +12,18 @@ pub(crate) struct SummedNormals {
 
 impl SummedNormals {
     /// Sums other normals.
-    pub fn sum(&mut self, estimates: &[[f32; 4]], width: usize, height: usize) {
-        self.sums.sum_up(width, height, |at: usize| {
-            let [x, y, z, _] = estimates[at].map(f64::from);
-            if x.is_nan() { [0.0; 4] } else { [x, y, z, 1.0] }
+    pub fn sum(&mut self, estimates: &[[f32; 4]], blocks: &Blocks) {
+        self.sums.sum_up(blocks.across, blocks.down, |place| {
+            let mut sum = [0.0; 4];
+            for at in blocks.pixels(place) {
+                let [x, y, z, _] = estimates[at].map(f64::from);
+                if !x.is_nan() {
+                    for (sum, value) in sum.iter_mut().zip([x, y, z, 1.0]) {
+                        *sum += value;
+                    }
+                }
+            }
+            sum
         });
     }
 
@@ -23,16 +32,18 @@ impl SummedNormals {
         self.sums.size()
     }
 
-    /// How much the normals in a rectangle vary: 1 - |mean|^2, for small angles their variance in square radians;
-    /// from 0 to 1, and 1 if there are none.
-    fn variation(&self, rect: &Rect) -> f64 {
-        let [x, y, z, count] = self.sums.sum(rect);
+    /// How much the normals of the blocks in a rectangle vary: 1 - |mean|^2, for small angles their variance in square
+    /// radians; from 0 to 1, and 1 if there are none.
+    fn variation(&self, blocks: &Rect) -> f64 {
+        let [x, y, z, count] = self.sums.sum(blocks);
         if count == 0.0 { 1.0 } else { 1.0 - (x * x + y * y + z * z) / (count * count) }
     }
 
-    /// Whether the normals in a rectangle vary strongly.
-    pub fn vary_in(&self, rect: &Rect) -> bool {
-        self.variation(rect) > STRONG_VARIATION
+    /// Whether the normals of the blocks that a rectangle of pixels touches vary strongly.
+    pub fn vary_in(&self, pixels: &Rect) -> bool {
+        let [x, y] =
+            [&pixels.x, &pixels.y].map(|range| range.start / BLOCK..range.end.div_ceil(BLOCK));
+        self.variation(&Rect { x, y }) > STRONG_VARIATION
     }
 }
 

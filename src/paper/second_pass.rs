@@ -118,19 +118,20 @@ impl SecondPass {
     fn concern(&mut self, cloud: &Cloud, blocks: &Blocks, options: &Options, limit: u32) {
         let SecondPass { estimates, sizes, wanted, concerned, levels, normals, .. } = self;
         if options.crease_windows {
-            normals.sum(estimates, cloud.width, cloud.height);
+            normals.sum(estimates, blocks);
         }
         refill(concerned, repeat_n(false, sizes.len()));
         wanted.clear();
         levels.clear();
-        for block in 0..blocks.count() {
+        let places = (0..blocks.down).flat_map(|row| (0..blocks.across).map(move |x| (x, row)));
+        for pixels in places.map(|place| blocks.pixels(place)) {
             let has_window = |at: usize| sizes[at] > 0 && !cloud.is_missing(at);
-            let normals_vary = |at: usize| {
-                has_window(at) && normals.vary_in(&window_of_size(cloud, options, at, sizes[at]))
-            };
-            let is_near_crease = options.crease_windows && blocks.pixels(block).any(normals_vary);
+            let window = || pixels.iter().find(|at| has_window(**at));
+            let normals_vary =
+                |at: &usize| normals.vary_in(&window_of_size(cloud, options, *at, sizes[*at]));
+            let is_near_crease = options.crease_windows && window().is_some_and(normals_vary);
             let (mut largest, mut level) = (0, 0);
-            for at in blocks.pixels(block) {
+            for at in pixels {
                 let size = wanted_size(cloud, options, at);
                 largest = size.max(largest);
                 if options.one_sided_windows && sizes[at] < size {

@@ -13,8 +13,13 @@ pub(crate) struct SummedArea<const N: usize> {
 }
 
 impl<const N: usize> SummedArea<N> {
-    /// Becomes the integral image of what `value` gives for every pixel number.
-    pub fn sum_up(&mut self, width: usize, height: usize, value: impl Fn(usize) -> [f64; N]) {
+    /// Becomes the integral image of what `value` gives for every column and row.
+    pub fn sum_up(
+        &mut self,
+        width: usize,
+        height: usize,
+        value: impl Fn((usize, usize)) -> [f64; N],
+    ) {
         let stride = width + 1;
         self.stride = stride;
         refill(&mut self.sums, repeat_n([0.0; N], stride * (height + 1)));
@@ -22,7 +27,7 @@ impl<const N: usize> SummedArea<N> {
             let (above, row) = self.sums[y * stride..].split_at_mut(stride);
             let mut along = [0.0; N];
             for (x, (to, above)) in row[1..stride].iter_mut().zip(&above[1..]).enumerate() {
-                let value = value(y * width + x);
+                let value = value((x, y));
                 for i in 0..N {
                     along[i] += value[i];
                     to[i] = above[i] + along[i];
