@@ -140,10 +140,10 @@ impl Estimator {
         let width = points.width();
         let write = |estimate: &dyn Fn(usize) -> Estimate| match indices {
             None => {
-                for pixel in 0..width * points.height() {
-                    let Estimate { normal, curvature } = estimate(pixel);
+                for (y, x) in (0..points.height()).flat_map(|y| (0..width).map(move |x| (y, x))) {
+                    let Estimate { normal, curvature } = estimate(y * width + x);
                     // SAFETY: the sizes are equal, and no other thread is at work.
-                    unsafe { normals.write(pixel % width, pixel / width, normal, curvature) };
+                    unsafe { normals.write(x, y, normal, curvature) };
                 }
             }
             Some(indices) => {

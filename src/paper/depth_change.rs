@@ -90,14 +90,19 @@ impl DepthChanges {
             jump <= f64::from(JITTER) * slope * gap as f64
         };
         let mut left = DepthChanges { width, height, right: vec![], below: vec![] };
-        let at = |at: usize| (at % width, at / width);
-        left.right.extend(self.right.iter().enumerate().map(|(i, change)| {
-            let (x, y) = at(i);
-            *change && !is_explained(0, i, x, y, |along, across| Rect { x: along, y: across })
+        left.right.extend(self.right.iter().enumerate().map(|(at, change)| {
+            let explained = || {
+                let (x, y) = (at % width, at / width);
+                is_explained(0, at, x, y, |along, across| Rect { x: along, y: across })
+            };
+            *change && !explained()
         }));
-        left.below.extend(self.below.iter().enumerate().map(|(i, change)| {
-            let (x, y) = at(i);
-            *change && !is_explained(1, i, y, x, |along, across| Rect { x: across, y: along })
+        left.below.extend(self.below.iter().enumerate().map(|(at, change)| {
+            let explained = || {
+                let (x, y) = (at % width, at / width);
+                is_explained(1, at, y, x, |along, across| Rect { x: across, y: along })
+            };
+            *change && !explained()
         }));
         left
     }
@@ -115,11 +120,13 @@ impl DepthChanges {
         };
         let around = |at: usize, size: usize| at.saturating_sub(1)..(at + 2).min(size);
         for (at, (right, below)) in self.right.iter().zip(&self.below).enumerate() {
-            let (x, y) = (at % width, at / width);
+            let pixel = || (at % width, at / width);
             if *right {
+                let (x, y) = pixel();
                 spoil(x..x + 2, around(y, height));
             }
             if *below {
+                let (x, y) = pixel();
                 spoil(around(x, width), y..y + 2);
             }
         }

@@ -151,7 +151,6 @@ impl SecondPass {
     fn replace(&mut self, cloud: &Cloud, options: &Options) {
         let SecondPass { estimates, concerned, choices, second, .. } = self;
         for at in (0..estimates.len()).filter(|at| concerned[*at]) {
-            let found = choices[at].map(|block| second[block as usize]);
             let around = || {
                 let pixel = (at % cloud.width, at / cloud.width);
                 let same = |depth: f32, difference: f32, distance: usize| {
@@ -160,11 +159,16 @@ impl SecondPass {
                 let has_none = options.one_sided_windows && estimates[at][0].is_nan();
                 has_none.then(|| surroundings::plane_around(cloud, pixel, same)).flatten()
             };
-            let found = found.filter(|found| !found[0].is_nan()).map(Estimate::from);
-            if let Some(found) = found.or_else(around) {
-                let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
-                estimates[at] = Estimate { normal, ..found }.into();
-            }
+            let found = match choices[at].map(|block| second[block as usize]) {
+                Some(found) if !found[0].is_nan() => found,
+                _ => match around() {
+                    Some(found) => found.into(),
+                    None => continue,
+                },
+            };
+            let [x, y, z, curvature] = found;
+            let normal = turn_to_viewpoint([x, y, z], cloud.points[at], options.viewpoint);
+            estimates[at] = Estimate { normal, curvature }.into();
         }
         if options.method != Method::CovarianceMatrix {
             estimates.iter_mut().for_each(|estimate| estimate[3] = f32::NAN);

@@ -65,8 +65,9 @@ impl<S: Simd> Fits<S> {
         }
     }
 
+    /// Writes the windows of as many lanes as there is room for.
     #[inline(always)]
-    fn windows(&self) -> [EvenWindow; GROUP] {
+    fn write(&self, windows: &mut [EvenWindow]) {
         let Fits { radii, inverse_depth, slope: [across, down], points, unevenness, noise } = *self;
         let mut fields = [[0.0; GROUP]; 7];
         let values = [radii, inverse_depth, across, down, points, unevenness, noise];
@@ -74,17 +75,16 @@ impl<S: Simd> Fits<S> {
             // SAFETY: there is a group, so there is the instruction set.
             unsafe { S::store(field.as_mut_ptr(), value.narrow().0) };
         }
-        let mut windows = [EvenWindow::default(); GROUP];
-        for lane in 0..GROUP {
+        for (lane, window) in windows.iter_mut().enumerate() {
             let [radius, inverse_depth, across, down, points, unevenness, noise] =
                 fields.each_ref().map(|field| field[lane]);
+            *window = EvenWindow::default();
             if radius > 0.0 {
                 let slope = [across, down];
                 let worth = EvenWindow::worth(radius as u32, points);
-                windows[lane] = EvenWindow { inverse_depth, slope, unevenness, noise, ..worth };
+                *window = EvenWindow { inverse_depth, slope, unevenness, noise, ..worth };
             }
         }
-        windows
     }
 }
 
@@ -115,7 +115,7 @@ impl EvenTile<'_> {
                 // SAFETY: as the caller's.
                 unsafe {
                     let found = self.eight::<S>(rings, &moments, (x, y), blocks.clone());
-                    windows.part(blocks.clone()).copy_from_slice(&found[..blocks.len()]);
+                    found.write(windows.part(blocks));
                 }
             }
         }
@@ -140,7 +140,7 @@ impl EvenTile<'_> {
         moments: &CovarianceMatrix,
         pixel: (usize, usize),
         blocks: Range<usize>,
-    ) -> [EvenWindow; GROUP] {
+    ) -> Fits<S> {
         let first = self.cloud.index(pixel.0, pixel.1);
         let [mut wanted, mut clean, mut largest] = [[0.0; GROUP]; 3];
         for (lane, block) in blocks.enumerate() {
@@ -184,7 +184,7 @@ impl EvenTile<'_> {
                 radii.0 = S::truncate((radii * Floats::splat(0.5)).0);
                 is_first = false;
             }
-            found.windows()
+            found
         }
     }
 
