@@ -71,14 +71,18 @@ pub(crate) fn smallest_eigenpair(m: &Symmetric3) -> (f64, [f64; 3]) {
 ///
 /// Cyclic Jacobi rotations: slow, and right to the last bits whatever the eigenvalues are.
 pub(crate) fn eigen(m: &Symmetric3) -> ([f64; 3], [f64; 3]) {
+    /// Elements beside the diagonal that turn no eigenvector and change no value by as much as rounding does.
+    const NEGLIGIBLE: f64 = 1e-3 * f64::EPSILON;
     let mut a = [[m.xx, m.xy, m.xz], [m.xy, m.yy, m.yz], [m.xz, m.yz, m.zz]];
     let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    const SWEEPS: usize = 12; // convergence is quadratic: 5 or 6 are enough
+    const SWEEPS: usize = 12; // convergence is quadratic: 4 or 5 are enough
     for _ in 0..SWEEPS {
+        let mut is_diagonal = true;
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {
-            if a[p][q] == 0.0 {
+            if a[p][q].abs() <= NEGLIGIBLE * (a[p][p] * a[q][q]).abs().sqrt() {
                 continue;
             }
+            is_diagonal = false;
             let theta = (a[q][q] - a[p][p]) / (2.0 * a[p][q]);
             let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
             let c = 1.0 / (t * t + 1.0).sqrt();
@@ -92,6 +96,9 @@ pub(crate) fn eigen(m: &Symmetric3) -> ([f64; 3], [f64; 3]) {
             for row in &mut v {
                 (row[p], row[q]) = (c * row[p] - s * row[q], s * row[p] + c * row[q]);
             }
+        }
+        if is_diagonal {
+            break;
         }
     }
     let mut order = [0, 1, 2];

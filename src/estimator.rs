@@ -1,14 +1,15 @@
 //! The estimator: options and scratch memory, and the steps in their order.
 
-use std::iter::repeat_n;
+use std::iter::{self, repeat_n};
 
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::depth_change::depth_change_map;
 use crate::distance::distance_map;
+use crate::eigenvalues::eigenvalue_map;
 use crate::fast::{self, SMALLEST_IMAGE, Scratch};
 use crate::isa::Isa;
-use crate::methods::{Estimate, covariance_matrix, estimate, estimate_window};
+use crate::methods::{Estimate, estimate, estimate_window, start};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
 use crate::paper::{
@@ -248,9 +249,7 @@ impl Estimator {
                     }
                 }
                 if let Some(map) = &mut maps.eigenvalues {
-                    for (at, to) in map.as_chunks_mut().0.iter_mut().enumerate() {
-                        *to = plain.eigenvalues(at % width, at / width);
-                    }
+                    map.copy_from_slice(plain.eigenvalue_map().as_flattened());
                 }
                 plain.depth_changes
             }
@@ -260,8 +259,14 @@ impl Estimator {
                 write(&mut maps.distances, &of_paper.distances);
                 write(&mut maps.smoothing_areas, &of_paper.smoothing_radii);
                 if let Some(map) = &mut maps.eigenvalues {
-                    let values =
-                        paper::eigenvalue_map(points, &self.options, &of_paper.smoothing_radii);
+                    let radius = |x: usize, y: usize| of_paper.smoothing_radii[y * width + x];
+                    let window = |x: usize, y: usize| {
+                        let window = || paper::window((x, y), radius(x, y) as usize, width, height);
+                        (radius(x, y) > 0.0).then(|| iter::once(window()))
+                    };
+                    let reach =
+                        of_paper.smoothing_radii.iter().copied().fold(0.0, f32::max) as usize;
+                    let values = eigenvalue_map(points, reach, window);
                     map.copy_from_slice(values.as_flattened());
                 }
                 of_paper.depth_changes
@@ -477,10 +482,17 @@ impl<'a> Plain<'a> {
         Estimate { normal, ..found }
     }
 
-    /// The eigenvalues of the covariance matrix of a pixel's window.
-    fn eigenvalues(&self, x: usize, y: usize) -> [f32; 3] {
-        let side = self.window_side(x, y) as usize;
-        let values = covariance_matrix::eigenvalues(self.points, &self.image, (x, y), (side, side));
-        values.map_or([f32::NAN; 3], |values| values.map(|value| value as f32))
+    /// The eigenvalues of the covariance matrices of all pixels' windows.
+    fn eigenvalue_map(&self) -> Vec<[f32; 3]> {
+        let window = |x: usize, y: usize| {
+            let side = self.window_side(x, y) as usize;
+            let first = (start(x, side), start(y, side));
+            let rects = self.image.rects(first, (side, side));
+            let rects = rects.filter(|rect| !rect.x.is_empty() && !rect.y.is_empty());
+            (side > 0).then(|| rects.map(|rect| paper::Rect { x: rect.x, y: rect.y }))
+        };
+        let Image { width, height, .. } = self.image;
+        let sides = (0..width * height).map(|at| self.window_side(at % width, at / width));
+        eigenvalue_map(self.points, sides.max().unwrap_or(0) as usize, window)
     }
 }

@@ -28,6 +28,7 @@ mod cloud;
 mod depth_change;
 mod distance;
 mod eigen;
+mod eigenvalues;
 mod error;
 mod estimator;
 mod fast;

@@ -4,6 +4,7 @@ mod clouds;
 
 use clouds::{Cloud, Kind, assert_same_bits, compute, methods, options};
 use iine::{BorderPolicy, Error, Estimator, Isa, Maps, Method, Normals, Options, Semantics};
+use iine_scenes::{REAL_FRAMES, real_frame};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 /// Every map that a combination of options has, written.
@@ -29,60 +30,95 @@ fn bits(values: &[f32]) -> Vec<u32> {
     values.iter().map(|value| value.to_bits()).collect()
 }
 
-#[test]
-fn eigenvalues_of_pcls_windows() {
-    for (seed, kind) in (0..).zip(Kind::ALL) {
-        let cloud = Cloud::new(kind, 64, 48, seed);
-        for policy in BorderPolicy::ALL {
-            let mut estimator =
-                Estimator::new(options((Method::CovarianceMatrix, policy), 7.0, false));
-            let pixels = cloud.points.len();
-            let (mut areas, mut eigenvalues) = (vec![0.0; pixels], vec![0.0; 3 * pixels]);
-            let mut maps = Maps {
-                smoothing_areas: Some(&mut areas),
-                eigenvalues: Some(&mut eigenvalues),
-                ..Maps::default()
-            };
-            estimator.compute_maps(&cloud.view(), &mut maps).unwrap();
-            let normals = compute(&mut estimator, &cloud);
-            let mut compared = 0;
-            for (at, values) in eigenvalues.chunks_exact(3).enumerate() {
-                let side = areas[at] as usize;
-                if side == 0 {
-                    assert!(values.iter().all(|value| value.is_nan()));
-                    continue;
-                }
-                assert!(0.0 <= values[0] && values[0] <= values[1] && values[1] <= values[2]);
-                // The curvature is the smallest over their sum.
-                let trace = values.iter().map(|value| f64::from(*value)).sum::<f64>();
-                let curvature = f64::from(normals[at][3]);
-                assert!((f64::from(values[0]) - curvature * trace).abs() <= 1e-5 * trace);
+/// Compares every `step`-th pixel's eigenvalues with those of its window's points, summed one by one, and all with the
+/// curvatures; gives the number of windows compared. With PCL's semantics those across the border are left out.
+fn check_eigenvalues(cloud: &Cloud, options: Options, step: usize) -> usize {
+    let Cloud { width, height, .. } = *cloud;
+    let what = format!("{options:?}");
+    let is_paper = options.semantics == Semantics::Paper;
+    let mut estimator = Estimator::new(options);
+    let pixels = cloud.points.len();
+    let (mut areas, mut eigenvalues) = (vec![0.0; pixels], vec![0.0; 3 * pixels]);
+    let mut maps = Maps {
+        smoothing_areas: Some(&mut areas),
+        eigenvalues: Some(&mut eigenvalues),
+        ..Maps::default()
+    };
+    estimator.compute_maps(&cloud.view(), &mut maps).unwrap();
+    let normals = compute(&mut estimator, cloud);
+    let mut compared = 0;
+    for (at, values) in eigenvalues.chunks_exact(3).enumerate() {
+        let size = areas[at] as usize;
+        if size == 0 {
+            assert!(values.iter().all(|value| value.is_nan()));
+            continue;
+        }
+        assert!(0.0 <= values[0] && values[0] <= values[1] && values[1] <= values[2]);
+        // The curvature is the smallest over their sum.
+        let trace = values.iter().map(|value| f64::from(*value)).sum::<f64>();
+        let curvature = f64::from(normals[at][3]);
+        let difference = (f64::from(values[0]) - curvature * trace).abs();
+        assert!(curvature.is_nan() || difference <= 1e-5 * trace, "{what} at {at}");
 
-                let (x, y) = (at % cloud.width, at / cloud.width);
-                let is_inside = |at: usize, size: usize| at >= side && at + side < size;
-                if !(is_inside(x, cloud.width) && is_inside(y, cloud.height)) {
-                    continue;
+        let (x, y) = (at % width, at / width);
+        let is_inside = |at: usize, count: usize| at >= size && at + size < count;
+        if at % step != 0 || !(is_paper || is_inside(x, width) && is_inside(y, height)) {
+            continue;
+        }
+        let range = |at: usize, count: usize| {
+            let (before, after) =
+                if is_paper { (size, size + 1) } else { (size / 2, size.div_ceil(2)) };
+            at.saturating_sub(before)..(at + after).min(count)
+        };
+        let points: Vec<Vector3<f64>> = range(y, height)
+            .flat_map(|y| range(x, width).map(move |x| y * width + x))
+            .map(|at| Vector3::from(cloud.points[at].map(f64::from)))
+            .filter(|point| point.iter().all(|c| c.is_finite()))
+            .collect();
+        let count = points.len() as f64;
+        let mean = points.iter().sum::<Vector3<f64>>() / count;
+        let matrix: Matrix3<f64> =
+            points.iter().map(|p| (p - mean) * (p - mean).transpose() / count).sum();
+        let mut expected = SymmetricEigen::new(matrix).eigenvalues;
+        expected.as_mut_slice().sort_by(f64::total_cmp);
+        for (found, expected) in values.iter().zip(expected.iter()) {
+            let difference = (f64::from(*found) - expected).abs();
+            let allowed = 1e-6 * expected.abs() + 1e-10 * matrix.trace();
+            assert!(difference <= allowed, "{what} at {x},{y}: {found}, not {expected}");
+        }
+        compared += 1;
+    }
+    compared
+}
+
+#[test]
+fn eigenvalues_are_those_of_the_windows_points() {
+    for (seed, kind) in (0..).zip(Kind::ALL) {
+        // High enough for several bands of rows.
+        let cloud = Cloud::new(kind, 64, 170, seed);
+        for policy in BorderPolicy::ALL {
+            for semantics in Semantics::ALL {
+                let mut options = options((Method::CovarianceMatrix, policy), 7.0, false);
+                options.semantics = semantics;
+                if options.check().is_ok() {
+                    let compared = check_eigenvalues(&cloud, options, 3);
+                    assert!(compared > 100, "{kind:?}: {compared}");
                 }
-                let (left, top) = (x - side / 2, y - side / 2);
-                let points: Vec<Vector3<f64>> = (top..top + side)
-                    .flat_map(|y| (left..left + side).map(move |x| y * cloud.width + x))
-                    .map(|at| Vector3::from(cloud.points[at].map(f64::from)))
-                    .filter(|point| point.iter().all(|c| c.is_finite()))
-                    .collect();
-                let count = points.len() as f64;
-                let mean = points.iter().sum::<Vector3<f64>>() / count;
-                let matrix: Matrix3<f64> =
-                    points.iter().map(|p| (p - mean) * (p - mean).transpose() / count).sum();
-                let mut expected = SymmetricEigen::new(matrix).eigenvalues;
-                expected.as_mut_slice().sort_by(f64::total_cmp);
-                for (found, expected) in values.iter().zip(expected.iter()) {
-                    let difference = (f64::from(*found) - expected).abs();
-                    let allowed = 1e-6 * expected.abs() + 1e-10 * matrix.trace();
-                    assert!(difference <= allowed, "{kind:?} at {x},{y}: {found}, not {expected}");
-                }
-                compared += 1;
             }
-            assert!(compared > 100, "{kind:?}: {compared}");
+        }
+    }
+}
+
+#[test]
+fn eigenvalues_of_real_frames() {
+    for name in REAL_FRAMES {
+        let Some(frame) = real_frame("eigenvalues_of_real_frames", name) else { continue };
+        let cloud = Cloud { points: frame.points, width: frame.width, height: frame.height };
+        for semantics in Semantics::ALL {
+            let mut options = options((Method::CovarianceMatrix, BorderPolicy::Ignore), 10.0, true);
+            options.semantics = semantics;
+            let compared = check_eigenvalues(&cloud, options, 101);
+            assert!(compared > 100, "{name}: {compared}");
         }
     }
 }

@@ -12,35 +12,15 @@ use crate::window::Image;
 pub(crate) fn estimate(
     points: &Points,
     image: &Image,
-    pixel: (usize, usize),
-    size: (usize, usize),
-) -> Estimate {
-    scatter(points, image, pixel, size)
-        .map_or(Estimate::NONE, |scatter| from_covariance(&scatter.matrix))
-}
-
-/// The eigenvalues of the window's covariance matrix, ascending; none if the window has no finite point.
-pub(crate) fn eigenvalues(
-    points: &Points,
-    image: &Image,
-    pixel: (usize, usize),
-    size: (usize, usize),
-) -> Option<[f64; 3]> {
-    Some(scatter(points, image, pixel, size)?.eigenvalues())
-}
-
-/// Of the window's finite points.
-fn scatter(
-    points: &Points,
-    image: &Image,
     (x, y): (usize, usize),
     (width, height): (usize, usize),
-) -> Option<Scatter> {
+) -> Estimate {
     let window = (start(x, width), start(y, height));
     let rects = image.rects(window, (width, height));
     let pixels = || rects.clone().flat_map(|rect| rect.pixels());
     let finite = |(x, y)| Some(points.at(x, y)).filter(|point| is_finite(*point));
     Scatter::of(|| pixels().filter_map(finite).map(|point| point.map(f64::from)))
+        .map_or(Estimate::NONE, |scatter| from_covariance(&scatter.matrix))
 }
 
 /// The estimate from a (scaled) covariance matrix.

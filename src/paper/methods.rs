@@ -29,12 +29,6 @@ pub(crate) fn plane_of<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> 
     Some(Estimate { normal: vector.map(|c| c as f32), curvature: (values[0] / trace) as f32 })
 }
 
-/// The eigenvalues of the covariance matrix (Eq. 16) of the finite points in a rectangle, ascending; none if there
-/// are no points.
-pub(crate) fn eigenvalues(cloud: &impl CleanPoints, rect: &Rect) -> Option<[f64; 3]> {
-    Some(Scatter::of(|| cloud.finite(rect))?.eigenvalues())
-}
-
 /// The 3-D gradient method: the cross product of the mean central differences of the points.
 fn gradients(cloud: &impl CleanPoints, rect: &Rect) -> Estimate {
     let horizontal = mean_difference(cloud, rect, (1, 0));

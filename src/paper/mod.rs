@@ -29,6 +29,7 @@ pub(crate) use planes::{JITTER, Plane, inverse_depth};
 pub(crate) use rect::Rect;
 pub(crate) use second_pass::{Engine, SecondPass};
 pub(crate) use smoothing_area::window;
+pub(crate) use summed_area::SummedArea;
 
 use depth_change::DepthChanges;
 
@@ -71,22 +72,6 @@ impl PaperMaps {
         let smoothing_radii = depth_radii.iter().zip(&distances).map(radius).collect();
         PaperMaps { depth_radii, depth_changes, distances, smoothing_radii }
     }
-}
-
-/// The covariance matrices' eigenvalues of all pixels with one of these radii; NaN for the others.
-pub(crate) fn eigenvalue_map(points: &Points, options: &Options, radii: &[f32]) -> Vec<[f32; 3]> {
-    let cloud = Cleaned { points, zero_is_missing: options.zero_is_missing };
-    let (width, height) = (points.width(), points.height());
-    let of_pixel = |(at, &radius): (usize, &f32)| {
-        if radius == 0.0 {
-            return [f32::NAN; 3];
-        }
-        let pixel = (at % width, at / width);
-        let rect = smoothing_area::window(pixel, radius as usize, width, height);
-        let values = methods::eigenvalues(&cloud, &rect);
-        values.map_or([f32::NAN; 3], |values| values.map(|value| value as f32))
-    };
-    radii.iter().enumerate().map(of_pixel).collect()
 }
 
 /// The points, row by row, with NaN for every missing one.

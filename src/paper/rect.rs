@@ -16,8 +16,9 @@ impl Rect {
         Rect { x: clip(x, width), y: clip(y, height) }
     }
 
-    pub fn pixels(&self) -> impl Iterator<Item = (usize, usize)> + use<'_> {
-        self.y.clone().flat_map(move |y| self.x.clone().map(move |x| (x, y)))
+    pub fn pixels(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let Rect { x: columns, y: rows } = self.clone();
+        rows.flat_map(move |y| columns.clone().map(move |x| (x, y)))
     }
 
     /// Without the outermost rows and columns.
