@@ -84,10 +84,12 @@ impl DepthChanges {
             let (last, first) = (i + 1 - gap, i + 1);
             let before = rect((last + 1).saturating_sub(ALONG)..last + 1, across.clone());
             let after = rect(first..(first + ALONG).min(length), across);
-            let slope = |rect: &Rect| Plane::of(cloud, rect).map(|plane| plane.slope[axis].abs());
-            let slopes = [slope(&before), slope(&after)].into_iter().flatten();
-            let slope = slopes.reduce(f64::min).unwrap_or(0.0);
-            jump <= f64::from(JITTER) * slope * gap as f64
+            let is_steep = |rect: Rect| {
+                let slope = Plane::of(cloud, &rect)?.slope[axis].abs();
+                Some(jump <= f64::from(JITTER) * slope * gap as f64)
+            };
+            let mut sides = [before, after].into_iter().filter_map(is_steep).peekable();
+            sides.peek().is_some() && sides.all(|is_steep| is_steep)
         };
         let mut left = DepthChanges { width, height, right: vec![], below: vec![] };
         left.right.extend(self.right.iter().enumerate().map(|(at, change)| {
