@@ -231,25 +231,26 @@ impl EvenWindows<'_> {
         let noise = noise.max(self.asked.least_noise);
         let pixel = (own % cloud.width, own / cloud.width);
         let near = self.near(pixel);
+        let [x, y] = way(first, pixel);
         let (point, tolerance) = (inverse_depth(cloud.depths[own]), self.tolerance(own));
         let mut best: Option<(f32, usize)> = None;
         for place in found {
             let window = &self.windows[place];
-            let [dx, dy] = way(blocks.first(place), pixel);
-            let short = (distance([dx, dy]) - window.radius).max(0.0);
-            let least = best.map_or(f32::INFINITY, |(least, _)| least);
-            let far = 1.0 + short * short;
-            let at_pixel = |x: f32, y: f32| {
-                window.inverse_depth + window.slope[0] * (dx + x) + window.slope[1] * (dy + y)
-            };
-            let astray = near.inverse_depth - at_pixel(near.offset[0], near.offset[1]);
-            let astray = (astray * astray - NEAR_NOISE * noise / near.points).max(0.0);
-            let misfit = (window.unevenness - noise).max(0.0);
-            let bend = MISFIT * misfit + NEAR * astray;
-            let cost = (noise * window.per_noise + bend * window.per_bend) * far;
+            let [dx, dy] = way(blocks.first(place), first);
             let [across, down] = window.slope;
-            let steepness = || (across * across + down * down).sqrt();
-            let lies_in = || (point - at_pixel(0.0, 0.0)).abs() < tolerance + JITTER * steepness();
+            let at_first = window.inverse_depth + across * dx + down * dy;
+            let misfit = (window.unevenness - noise).max(0.0);
+            let even = noise * window.per_noise + MISFIT * misfit * window.per_bend;
+            let per_astray = NEAR * window.per_bend;
+            let jitter = JITTER * (across * across + down * down).sqrt();
+
+            let least = best.map_or(f32::INFINITY, |(least, _)| least);
+            let at = |x: f32, y: f32| at_first + across * x + down * y;
+            let astray = near.inverse_depth - at(x + near.offset[0], y + near.offset[1]);
+            let astray = (astray * astray - NEAR_NOISE * noise / near.points).max(0.0);
+            let short = (distance([dx + x, dy + y]) - window.radius).max(0.0);
+            let cost = (even + astray * per_astray) * (1.0 + short * short);
+            let lies_in = || (point - at(x, y)).abs() < tolerance + jitter;
             if cost < least && (short == 0.0 || lies_in()) {
                 best = Some((cost, place));
             }

@@ -30,6 +30,7 @@ pub(super) unsafe fn row<S: Simd>(even: &EvenWindows, row: usize, choices: &mut 
         unsafe {
             group.candidates(&mut found);
             if found.number > 0 {
+                found.weigh(even.asked.least_noise);
                 for (y, choices) in choices.chunks_mut(even.cloud.width).enumerate() {
                     for x in 0..BLOCK {
                         group.choose(&found, &neighbours, [x, y], choices);
@@ -58,11 +59,16 @@ struct Candidates<S: Simd> {
     /// The ways from the windows' pixels to the eight blocks' first.
     to_first: [Floats<S>; 2],
     radius: Floats<S>,
-    inverse_depth: Floats<S>,
+    /// The planes' inverse depths at these, and their slopes.
+    at_first: Floats<S>,
     slope: [Floats<S>; 2],
     unevenness: Floats<S>,
     per_noise: Floats<S>,
     per_bend: Floats<S>,
+    /// What the windows cost any pixel, once the noise is known.
+    even: Floats<S>,
+    /// How far the sensor's noise along rows and columns moves points off the plane.
+    jitter: Floats<S>,
 }
 
 /// Of the points next to each of eight pixels, as the plain form has them.
@@ -80,18 +86,20 @@ impl<S: Simd> Candidates<S> {
     unsafe fn none() -> Self {
         // SAFETY: as the caller's.
         let zero = unsafe { Floats::splat(0.0) };
-        let [radius, inverse_depth, unevenness, per_noise, per_bend] = [zero; 5];
+        let [radius, at_first, unevenness, per_noise, per_bend, even, jitter] = [zero; 7];
         let (places, lanes, to_first, slope) = ([0; GROUP], 0, [zero; 2], [zero; 2]);
         Candidates {
             places,
             lanes,
             to_first,
             radius,
-            inverse_depth,
+            at_first,
             slope,
             unevenness,
             per_noise,
             per_bend,
+            even,
+            jitter,
         }
     }
 }
@@ -146,13 +154,32 @@ impl<S: Simd> Found<S> {
             to.lanes = lanes & zero.lt(radius) & near;
             to.to_first = to_first;
             to.radius = radius;
-            to.inverse_depth = Floats(inverse_depth);
-            to.slope = [Floats(across), Floats(down)];
+            let (across, down) = (Floats(across), Floats(down));
+            to.at_first = Floats(inverse_depth) + across * to_first[0] + down * to_first[1];
+            to.slope = [across, down];
+            to.jitter = Floats::splat(JITTER) * (across * across + down * down).sqrt();
             to.unevenness = Floats(unevenness);
             to.per_noise = Floats(per_noise);
             to.per_bend = Floats(per_bend);
             let less = S::min(noise, self.noise.0);
             self.noise.0 = S::select(S::mask(to.lanes), less, self.noise.0);
+        }
+    }
+
+    /// Finds what the windows cost any pixel: all have been added.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn weigh(&mut self, least_noise: f32) {
+        // SAFETY: as the caller's.
+        unsafe {
+            self.noise = self.noise.max(Floats::splat(least_noise));
+            for candidates in &mut self.candidates[..self.number] {
+                let misfit = (candidates.unevenness - self.noise).max(Floats::splat(0.0));
+                candidates.even = self.noise * candidates.per_noise
+                    + Floats::splat(MISFIT) * misfit * candidates.per_bend;
+            }
         }
     }
 }
@@ -268,29 +295,23 @@ impl Group<'_> {
             let (zero, one) = (Floats::splat(0.0), Floats::splat(1.0));
             let [column, row] = [column, row].map(|at| Floats::splat(at as f32));
             let tolerance = Floats(S::load(tolerances.as_ptr()));
-            let noise = found.noise.max(Floats::splat(self.even.asked.least_noise));
-            let near_noise = Floats::splat(NEAR_NOISE) * noise / near.points;
+            let near_noise = Floats::splat(NEAR_NOISE) * found.noise / near.points;
+            let at_near = [column + near.offset[0], row + near.offset[1]];
             let mut least = Floats::splat(f32::INFINITY);
             let mut best = S::splat(-1.0);
             let found = &found.candidates[..found.number];
             for (number, candidates) in found.iter().enumerate() {
-                let [dx, dy] = candidates.to_first;
-                let (dx, dy) = (dx + column, dy + row);
                 let [across, down] = candidates.slope;
-                let short = (dx.abs().max(dy.abs()) - candidates.radius).max(zero);
-                let far = one + short * short;
-                let at_near = candidates.inverse_depth
-                    + across * (dx + near.offset[0])
-                    + down * (dy + near.offset[1]);
+                let at_near = candidates.at_first + across * at_near[0] + down * at_near[1];
                 let astray = near.inverse_depth - at_near;
                 let astray = (astray * astray - near_noise).max(zero);
-                let misfit = (candidates.unevenness - noise).max(zero);
-                let bend = Floats::splat(MISFIT) * misfit + Floats::splat(NEAR) * astray;
-                let cost = (noise * candidates.per_noise + bend * candidates.per_bend) * far;
-                let at_pixel = candidates.inverse_depth + across * dx + down * dy;
-                let steepness = (across * across + down * down).sqrt();
-                let limit = tolerance + Floats::splat(JITTER) * steepness;
-                let lies_in = (near.own - at_pixel).abs().lt(limit);
+                let per_astray = Floats::splat(NEAR) * candidates.per_bend;
+                let [dx, dy] = candidates.to_first;
+                let distance = (dx + column).abs().max((dy + row).abs());
+                let short = (distance - candidates.radius).max(zero);
+                let cost = (candidates.even + astray * per_astray) * (one + short * short);
+                let at_pixel = candidates.at_first + across * column + down * row;
+                let lies_in = (near.own - at_pixel).abs().lt(tolerance + candidates.jitter);
                 let can_take = candidates.lanes & (lies_in | !zero.lt(short));
                 let better = S::mask(cost.lt(least) & can_take);
                 least.0 = S::select(better, cost.0, least.0);
