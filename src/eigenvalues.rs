@@ -44,8 +44,6 @@ pub(crate) fn eigenvalue_map<W: Iterator<Item = Rect> + Clone>(
 #[derive(Default)]
 struct Band {
     top: usize,
-    /// A point of the band: sums about it lose less.
-    origin: [f64; 3],
     /// Number of finite points; x, y, z; xx, xy, xz, yy, yz, zz.
     sums: SummedArea<10>,
     /// What the rounding errors of sums stay below.
@@ -56,12 +54,12 @@ impl Band {
     fn sum(&mut self, points: &Points, rows: Range<usize>) {
         let width = points.width();
         let whole = Rect { x: 0..width, y: rows.clone() };
-        let finite = |(x, y)| Some(points.at(x, y)).filter(|point| is_finite(*point));
-        let origin = whole.pixels().find_map(finite).unwrap_or_default().map(f64::from);
-        (self.top, self.origin) = (rows.start, origin);
+        // Sums about a point of the band lose less.
+        let origin = whole.pixels().find_map(|pixel| finite(points, pixel)).unwrap_or_default();
+        self.top = rows.start;
         self.sums.sum_up(width, rows.len(), |(x, y)| {
-            finite((x, y + rows.start)).map_or([0.0; 10], |point| {
-                let [x, y, z]: [f64; 3] = std::array::from_fn(|i| f64::from(point[i]) - origin[i]);
+            finite(points, (x, y + rows.start)).map_or([0.0; 10], |point| {
+                let [x, y, z]: [f64; 3] = std::array::from_fn(|i| point[i] - origin[i]);
                 [1.0, x, y, z, x * x, x * y, x * z, y * y, y * z, z * z]
             })
         });
@@ -99,7 +97,13 @@ impl Band {
             return Some(values.map(|value| value / count));
         }
         let pixels = || window.clone().flat_map(|rect| rect.pixels());
-        let finite = |(x, y)| Some(points.at(x, y)).filter(|point| is_finite(*point));
-        Some(Scatter::of(|| pixels().filter_map(finite).map(|p| p.map(f64::from)))?.eigenvalues())
+        let finite = || pixels().filter_map(|pixel| finite(points, pixel));
+        Some(Scatter::of(finite)?.eigenvalues())
     }
+}
+
+/// A pixel's point, unless it is missing.
+fn finite(points: &Points, (x, y): (usize, usize)) -> Option<[f64; 3]> {
+    let point = points.at(x, y);
+    is_finite(point).then(|| point.map(f64::from))
 }

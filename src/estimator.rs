@@ -1,6 +1,6 @@
 //! The estimator: options and scratch memory, and the steps in their order.
 
-use std::iter::{self, repeat_n};
+use std::iter::repeat_n;
 
 use crate::Error;
 use crate::cloud::{Normals, Points};
@@ -259,15 +259,7 @@ impl Estimator {
                 write(&mut maps.distances, &of_paper.distances);
                 write(&mut maps.smoothing_areas, &of_paper.smoothing_radii);
                 if let Some(map) = &mut maps.eigenvalues {
-                    let radius = |x: usize, y: usize| of_paper.smoothing_radii[y * width + x];
-                    let window = |x: usize, y: usize| {
-                        let window = || paper::window((x, y), radius(x, y) as usize, width, height);
-                        (radius(x, y) > 0.0).then(|| iter::once(window()))
-                    };
-                    let reach =
-                        of_paper.smoothing_radii.iter().copied().fold(0.0, f32::max) as usize;
-                    let values = eigenvalue_map(points, reach, window);
-                    map.copy_from_slice(values.as_flattened());
+                    map.copy_from_slice(of_paper.eigenvalue_map(points).as_flattened());
                 }
                 of_paper.depth_changes
             }

@@ -31,9 +31,12 @@ pub(crate) use second_pass::{Engine, SecondPass};
 pub(crate) use smoothing_area::window;
 pub(crate) use summed_area::SummedArea;
 
+use std::iter::once;
+
 use depth_change::DepthChanges;
 
 use crate::cloud::Points;
+use crate::eigenvalues::eigenvalue_map;
 use crate::methods::Estimate;
 use crate::options::{Options, Semantics};
 
@@ -71,6 +74,17 @@ impl PaperMaps {
         };
         let smoothing_radii = depth_radii.iter().zip(&distances).map(radius).collect();
         PaperMaps { depth_radii, depth_changes, distances, smoothing_radii }
+    }
+
+    /// The eigenvalues of the covariance matrices of all pixels' windows.
+    pub fn eigenvalue_map(&self, points: &Points) -> Vec<[f32; 3]> {
+        let (width, height) = (points.width(), points.height());
+        let window = |x: usize, y: usize| {
+            let radius = self.smoothing_radii[y * width + x] as usize;
+            (radius > 0).then(|| once(window((x, y), radius, width, height)))
+        };
+        let reach = self.smoothing_radii.iter().copied().fold(0.0, f32::max);
+        eigenvalue_map(points, reach as usize, window)
     }
 }
 

@@ -59,7 +59,7 @@ struct Candidates<S: Simd> {
     /// The ways from the windows' pixels to the eight blocks' first.
     to_first: [Floats<S>; 2],
     radius: Floats<S>,
-    /// The planes' inverse depths at these, and their slopes.
+    /// The planes' inverse depths at the eight blocks' first pixels, and their slopes.
     at_first: Floats<S>,
     slope: [Floats<S>; 2],
     unevenness: Floats<S>,

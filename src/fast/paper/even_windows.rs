@@ -129,7 +129,7 @@ impl EvenTile<'_> {
         inverse.into_iter().find(|r| !r.is_nan()).unwrap_or(0.0)
     }
 
-    /// The windows of at most eight blocks, from that of pixel `first` on.
+    /// The windows of at most eight `blocks`, of which `pixel` is the first one's first.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`; the rings hold what the windows need.
