@@ -5,8 +5,8 @@ use std::ops::Range;
 
 use crate::cloud::Points;
 use crate::eigen::{Scatter, Symmetric3, eigen};
-use crate::methods::is_finite;
-use crate::paper::{Rect, SummedArea};
+use crate::methods::finite_point;
+use crate::paper::{ROUNDING, Rect, SummedArea};
 
 /// Rows of a band at least: those that its windows reach around it are summed with it.
 const BAND_ROWS: usize = 64;
@@ -55,16 +55,17 @@ impl Band {
         let width = points.width();
         let whole = Rect { x: 0..width, y: rows.clone() };
         // Sums about a point of the band lose less.
-        let origin = whole.pixels().find_map(|pixel| finite(points, pixel)).unwrap_or_default();
+        let origin =
+            whole.pixels().find_map(|pixel| finite_point(points, pixel)).unwrap_or_default();
         self.top = rows.start;
         self.sums.sum_up(width, rows.len(), |(x, y)| {
-            finite(points, (x, y + rows.start)).map_or([0.0; 10], |point| {
+            finite_point(points, (x, y + rows.start)).map_or([0.0; 10], |point| {
                 let [x, y, z]: [f64; 3] = std::array::from_fn(|i| point[i] - origin[i]);
                 [1.0, x, y, z, x * x, x * y, x * z, y * y, y * z, z * z]
             })
         });
         let [.., xx, _, _, yy, _, zz] = self.sums.sum(&Rect { x: 0..width, y: 0..rows.len() });
-        self.error = 4.0 * f64::EPSILON * (xx + yy + zz);
+        self.error = ROUNDING * (xx + yy + zz);
     }
 
     /// The eigenvalues of the points in a window.
@@ -97,13 +98,7 @@ impl Band {
             return Some(values.map(|value| value / count));
         }
         let pixels = || window.clone().flat_map(|rect| rect.pixels());
-        let finite = || pixels().filter_map(|pixel| finite(points, pixel));
+        let finite = || pixels().filter_map(|pixel| finite_point(points, pixel));
         Some(Scatter::of(finite)?.eigenvalues())
     }
-}
-
-/// A pixel's point, unless it is missing.
-fn finite(points: &Points, (x, y): (usize, usize)) -> Option<[f64; 3]> {
-    let point = points.at(x, y);
-    is_finite(point).then(|| point.map(f64::from))
 }

@@ -362,17 +362,13 @@ impl paper::Engine for Engine<'_> {
         sizes: &mut Vec<u32>,
         estimates: &mut Vec<[f32; 4]>,
     ) -> Result<(), Error> {
-        let (width, height) = (self.points.width(), self.points.height());
+        let size @ (width, height) = (self.points.width(), self.points.height());
         let pixels = (0..width * height).map(|at| (at % width, at / width));
         if self.options.semantics == Semantics::Pcl {
             if !self.is_plain {
-                return self.written(
-                    (width, height),
-                    estimates,
-                    |isa, points, options, normals, scratch| {
-                        fast::compute_with_sides(isa, points, options, normals, sizes, scratch)
-                    },
-                );
+                return self.written(size, estimates, |isa, points, options, normals, scratch| {
+                    fast::compute_with_sides(isa, points, options, normals, sizes, scratch)
+                });
             }
             let plain = Plain::new(self.points, self.options);
             let side = |at: usize| plain.window_side(at % width, at / width);
@@ -386,7 +382,7 @@ impl paper::Engine for Engine<'_> {
             self.plain(pixels, estimates, |(x, y)| self.of_radius((x, y), sizes[y * width + x]));
             return Ok(());
         }
-        self.written((width, height), estimates, |isa, points, options, normals, scratch| {
+        self.written(size, estimates, |isa, points, options, normals, scratch| {
             fast::paper::compute_with_radii(isa, points, options, normals, sizes, scratch)
         })
     }

@@ -58,7 +58,7 @@ fn check_eigenvalues(cloud: &Cloud, options: Options, step: usize) -> usize {
         let trace = values.iter().map(|value| f64::from(*value)).sum::<f64>();
         let curvature = f64::from(normals[at][3]);
         let difference = (f64::from(values[0]) - curvature * trace).abs();
-        assert!(curvature.is_nan() || difference <= 1e-5 * trace, "{what} at {at}");
+        assert!(difference <= 1e-5 * trace, "{what} at {at}");
 
         let (x, y) = (at % width, at / width);
         let is_inside = |at: usize, count: usize| at >= size && at + size < count;
@@ -101,7 +101,7 @@ fn eigenvalues_are_those_of_the_windows_points() {
                 let mut options = options((Method::CovarianceMatrix, policy), 7.0, false);
                 options.semantics = semantics;
                 if options.check().is_ok() {
-                    let compared = check_eigenvalues(&cloud, options, 3);
+                    let compared = check_eigenvalues(&cloud, options, 1);
                     assert!(compared > 100, "{kind:?}: {compared}");
                 }
             }

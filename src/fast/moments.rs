@@ -5,6 +5,7 @@ use super::arithmetic::{Doubles, Floats, dot};
 use super::planes::{Frame, MARGIN, Planes, grow};
 use super::tile::{Found, Sums};
 use crate::cloud::Points;
+use crate::paper::ROUNDING;
 use crate::simd::twice::Twice;
 use crate::simd::{GROUP, Simd};
 use crate::window::Image;
@@ -55,9 +56,6 @@ impl WindowMoments<f64> {
         moments
     }
 }
-
-/// One unit in the last place of a double, and how many of it the path to a sum may gather.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// Newton steps for the eigenvalue: one or two are usual, a few more where two eigenvalues are near.
 const STEPS: usize = 8;

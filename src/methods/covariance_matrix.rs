@@ -1,7 +1,7 @@
 //! COVARIANCE_MATRIX: the paper's CM (Eq. 16-25): the eigenvector of the smallest eigenvalue of the window's
 //! covariance matrix, and as curvature that eigenvalue over the matrix's trace.
 
-use super::{Estimate, is_finite, start};
+use super::{Estimate, finite_point, start};
 use crate::cloud::Points;
 use crate::eigen::{Scatter, Symmetric3, smallest_eigenpair};
 use crate::window::Image;
@@ -18,8 +18,7 @@ pub(crate) fn estimate(
     let window = (start(x, width), start(y, height));
     let rects = image.rects(window, (width, height));
     let pixels = || rects.clone().flat_map(|rect| rect.pixels());
-    let finite = |(x, y)| Some(points.at(x, y)).filter(|point| is_finite(*point));
-    Scatter::of(|| pixels().filter_map(finite).map(|point| point.map(f64::from)))
+    Scatter::of(|| pixels().filter_map(|pixel| finite_point(points, pixel)))
         .map_or(Estimate::NONE, |scatter| from_covariance(&scatter.matrix))
 }
 

@@ -75,6 +75,12 @@ pub(crate) fn is_finite(point: [f32; 3]) -> bool {
     point.iter().all(|c| c.is_finite())
 }
 
+/// A pixel's point in double precision, if it is finite.
+pub(crate) fn finite_point(points: &Points, (x, y): (usize, usize)) -> Option<[f64; 3]> {
+    let point = points.at(x, y);
+    is_finite(point).then(|| point.map(f64::from))
+}
+
 #[inline(always)]
 pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]

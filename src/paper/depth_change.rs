@@ -70,43 +70,37 @@ impl DepthChanges {
         const ACROSS: usize = 2;
         let Self { width, height, .. } = *self;
         let inverse = |at: usize| f64::from(inverse_depth(cloud.depths[at]));
-        // `at` is the last pixel before the change, the `i`-th of its row or column, which is the `j`-th; `step`
-        // leads to the next one. `rect` makes a rectangle of ranges along and across.
-        type MakeRect = fn(Range<usize>, Range<usize>) -> Rect;
-        let is_explained = |axis: usize, at: usize, i: usize, j: usize, rect: MakeRect| {
+        // `at` is the last pixel before the change.
+        let is_explained = |axis: usize, at: usize| {
+            let pixel = [at % width, at / width];
+            // The pixel is the i-th of its row or column, which is the j-th; `step` leads to the next one.
+            let (i, j) = (pixel[axis], pixel[1 - axis]);
             let [step, length, lines] = [[1, width, height], [width, height, width]][axis];
             let next = at + step;
             let Some(gap) = (1..=i + 1).find(|gap| !cloud.is_missing(next - gap * step)) else {
                 return false;
             };
             let jump = (inverse(next) - inverse(next - gap * step)).abs();
-            let across = j.saturating_sub(ACROSS)..(j + ACROSS + 1).min(lines);
+            let rect = |along: Range<usize>| {
+                let across = j.saturating_sub(ACROSS)..(j + ACROSS + 1).min(lines);
+                let (x, y) = if axis == 0 { (along, across) } else { (across, along) };
+                Rect { x, y }
+            };
             let (last, first) = (i + 1 - gap, i + 1);
-            let before = rect((last + 1).saturating_sub(ALONG)..last + 1, across.clone());
-            let after = rect(first..(first + ALONG).min(length), across);
+            let before = rect((last + 1).saturating_sub(ALONG)..last + 1);
+            let after = rect(first..(first + ALONG).min(length));
             let is_steep = |rect: Rect| {
                 let slope = Plane::of(cloud, &rect)?.slope[axis].abs();
                 Some(jump <= f64::from(JITTER) * slope * gap as f64)
             };
-            let mut sides = [before, after].into_iter().filter_map(is_steep).peekable();
-            sides.peek().is_some() && sides.all(|is_steep| is_steep)
+            let mut sides = [before, after].into_iter().filter_map(is_steep);
+            sides.next() == Some(true) && sides.all(|is_steep| is_steep)
         };
-        let mut left = DepthChanges { width, height, right: vec![], below: vec![] };
-        left.right.extend(self.right.iter().enumerate().map(|(at, change)| {
-            let explained = || {
-                let (x, y) = (at % width, at / width);
-                is_explained(0, at, x, y, |along, across| Rect { x: along, y: across })
-            };
-            *change && !explained()
-        }));
-        left.below.extend(self.below.iter().enumerate().map(|(at, change)| {
-            let explained = || {
-                let (x, y) = (at % width, at / width);
-                is_explained(1, at, y, x, |along, across| Rect { x: across, y: along })
-            };
-            *change && !explained()
-        }));
-        left
+        let left = |axis: usize, changes: &[bool]| {
+            let is_left = |(at, change): (usize, &bool)| *change && !is_explained(axis, at);
+            changes.iter().enumerate().map(is_left).collect()
+        };
+        DepthChanges { width, height, right: left(0, &self.right), below: left(1, &self.below) }
     }
 
     /// The largest radius around every pixel, row by row, of a window in which no two neighbours are a depth change
@@ -122,13 +116,14 @@ impl DepthChanges {
         };
         let around = |at: usize, size: usize| at.saturating_sub(1)..(at + 2).min(size);
         for (at, (right, below)) in self.right.iter().zip(&self.below).enumerate() {
-            let pixel = || (at % width, at / width);
+            if !(*right || *below) {
+                continue;
+            }
+            let (x, y) = (at % width, at / width);
             if *right {
-                let (x, y) = pixel();
                 spoil(x..x + 2, around(y, height));
             }
             if *below {
-                let (x, y) = pixel();
                 spoil(around(x, width), y..y + 2);
             }
         }

@@ -29,7 +29,7 @@ pub(crate) use planes::{JITTER, Plane, inverse_depth};
 pub(crate) use rect::Rect;
 pub(crate) use second_pass::{Engine, SecondPass};
 pub(crate) use smoothing_area::window;
-pub(crate) use summed_area::SummedArea;
+pub(crate) use summed_area::{ROUNDING, SummedArea};
 
 use std::iter::once;
 

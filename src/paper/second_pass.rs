@@ -95,12 +95,12 @@ impl SecondPass {
         if !(options.one_sided_windows || options.crease_windows) {
             return Ok(&self.estimates);
         }
-        let limit = options.paper.largest_radius;
         let blocks = Blocks::of(cloud.width, cloud.height);
-        self.concern(cloud, &blocks, options, limit);
+        self.concern(cloud, &blocks, options);
         let SecondPass { wanted, levels, windows, choices, taken, second, .. } = self;
         let clean = depth_changes(cloud, options).not_explained(cloud).clean_radii();
         let least_noise = Asked::least_noise(options.paper.alpha);
+        let limit = options.paper.largest_radius;
         let asked = Asked { blocks, wanted, levels, clean: &clean, limit, least_noise };
         engine.even_windows(cloud, &asked, &asked.needed(), windows)?;
         let even = EvenWindows { cloud, asked: &asked, options, windows };
@@ -115,7 +115,7 @@ impl SecondPass {
     }
 
     /// Finds the pixels that another window may serve better than their own.
-    fn concern(&mut self, cloud: &Cloud, blocks: &Blocks, options: &Options, limit: u32) {
+    fn concern(&mut self, cloud: &Cloud, blocks: &Blocks, options: &Options) {
         let SecondPass { estimates, sizes, wanted, concerned, levels, normals, .. } = self;
         if options.crease_windows {
             normals.sum(estimates, blocks);
@@ -126,10 +126,10 @@ impl SecondPass {
         let places = (0..blocks.down).flat_map(|row| (0..blocks.across).map(move |x| (x, row)));
         for pixels in places.map(|place| blocks.pixels(place)) {
             let has_window = |at: usize| sizes[at] > 0 && !cloud.is_missing(at);
-            let window = || pixels.iter().find(|at| has_window(**at));
+            let first = || pixels.iter().find(|at| has_window(**at));
             let normals_vary =
                 |at: &usize| normals.vary_in(&window_of_size(cloud, options, *at, sizes[*at]));
-            let is_near_crease = options.crease_windows && window().is_some_and(normals_vary);
+            let is_near_crease = options.crease_windows && first().is_some_and(normals_vary);
             let (mut largest, mut level) = (0, 0);
             for at in pixels {
                 let size = wanted_size(cloud, options, at);
@@ -142,7 +142,7 @@ impl SecondPass {
                     level = CREASE_LEVELS.max(level);
                 }
             }
-            wanted.push(radius_of_size(largest, options).min(limit));
+            wanted.push(radius_of_size(largest, options).min(options.paper.largest_radius));
             levels.push(level);
         }
     }

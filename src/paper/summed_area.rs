@@ -5,6 +5,9 @@ use std::iter::repeat_n;
 use super::rect::Rect;
 use super::refill;
 
+/// What rounding on the path to a sum may gather, in units of the largest sum on it.
+pub(crate) const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
 /// Sums over every rectangle from the image's first pixel, with a row and a column of zeros before it.
 #[derive(Debug, Default)]
 pub(crate) struct SummedArea<const N: usize> {

@@ -102,7 +102,7 @@ impl<const N: usize> Rings<N> {
 
     /// The points of row `y` from column `x` on, room for `BLOCK` groups; those behind the last column mean nothing.
     #[inline(always)]
-    pub fn from(&self, x: usize, y: usize) -> &[Counted; BLOCK * GROUP] {
+    pub fn points_from(&self, x: usize, y: usize) -> &[Counted; BLOCK * GROUP] {
         let first = self.row(y).start + x - self.columns.start + 1;
         self.points[first..].first_chunk().expect("room behind the last row")
     }

@@ -6,7 +6,7 @@ use super::rects::Rects;
 use crate::fast::arithmetic::{Doubles, Floats, cross, dot};
 use crate::fast::moments::{WindowMoments, plane};
 use crate::fast::tile::{Bits, Found};
-use crate::paper::{CleanPoints, Rect};
+use crate::paper::{CleanPoints, ROUNDING, Rect};
 use crate::simd::{GROUP, Simd};
 
 /// A method's sums and normals.
@@ -43,9 +43,6 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
         None
     }
 }
-
-/// A few units in the last place of a double.
-const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 /// CM: moments about a point of the tile.
 pub(crate) struct CovarianceMatrix {

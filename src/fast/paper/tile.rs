@@ -24,8 +24,8 @@ pub(crate) struct Tile<'a, F> {
     pub whole_points: bool,
     /// How far a window reaches from its pixel at most.
     pub largest: usize,
-    /// Normals are of every so-manieth pixel of every so-manieth row, from the tile's first on, which is of one in the
-    /// image; at most `BLOCK`.
+    /// Pixels from one that gets a normal to the next, along rows and columns; the image's first pixel and the tile's
+    /// get one. At most `BLOCK`.
     pub step: usize,
     /// A row's depths, and the radii of its windows, 0 for none, if it has normals; both can be read up to a whole
     /// group.
@@ -137,7 +137,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                     fresh |= tried;
                 };
                 let plain = found.doubtful & windows;
-                let [px, py, pz, _] = gather::<S>(rings.from(x, y), &steps);
+                let [px, py, pz, _] = gather::<S>(rings.points_from(x, y), &steps);
                 let viewpoint = self.options.viewpoint;
                 let (sure, here) = (windows & !plain, [px, py, pz]);
                 let mut normals =
