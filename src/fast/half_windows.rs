@@ -90,8 +90,9 @@ impl Sums for HalfWindows {
             let mut carry = S::splat_d(0.0);
             for group in 0..groups {
                 let at = MARGIN + group * GROUP;
-                let along = S::add_d(S::prefix_sum_d(S::widen(S::load(z.add(at)))), carry);
-                carry = S::last_d(along);
+                let sum = S::prefix_sum_d(S::widen(S::load(z.add(at))));
+                let along = S::add_d(sum, carry);
+                carry = S::add_d(S::last_d(sum), carry);
                 let sum = match self.last {
                     Some(last) => {
                         S::add_d(along, S::load_d(integrals.add(last * frame.stride + at)))

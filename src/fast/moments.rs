@@ -26,10 +26,10 @@ pub(crate) struct Moments {
     error: f64,
 }
 
-/// The moments of windows, and their numbers of points.
+/// The moments of windows, and one over their numbers of points.
 pub(crate) struct WindowMoments<T> {
     pub sums: [T; CHANNELS],
-    pub count: T,
+    pub share: T,
 }
 
 impl<T: Copy> Clone for WindowMoments<T> {
@@ -42,8 +42,8 @@ impl<T: Copy> Copy for WindowMoments<T> {}
 impl WindowMoments<f64> {
     /// Of points, about the first of them.
     pub fn of(points: impl Iterator<Item = [f64; 3]>) -> Self {
-        let mut moments = WindowMoments { sums: [0.0; CHANNELS], count: 0.0 };
-        let mut origin = None;
+        let mut moments = WindowMoments { sums: [0.0; CHANNELS], share: 0.0 };
+        let (mut origin, mut count) = (None, 0);
         for point in points {
             let origin = origin.get_or_insert(point);
             let [x, y, z] = [0, 1, 2].map(|c| point[c] - origin[c]);
@@ -51,8 +51,9 @@ impl WindowMoments<f64> {
             for (sum, value) in moments.sums.iter_mut().zip(of_point) {
                 *sum += value;
             }
-            moments.count += 1.0;
+            count += 1;
         }
+        moments.share = 1.0 / f64::from(count);
         moments
     }
 }
@@ -61,14 +62,14 @@ impl WindowMoments<f64> {
 const STEPS: usize = 8;
 
 /// The step from which on one more changes the normal by less than 1e-6.
-const CONVERGED: f64 = 1e-3;
+const CONVERGED: f32 = 1e-3;
 
-/// A normal is doubtful if the error of the sums could turn it by more than 1e-5.
-const DOUBT_SUMS: f64 = 1e5;
+/// A normal is doubtful if the error of the sums could turn it by more than 3e-5.
+const DOUBT_SUMS: f64 = 3e4;
 
 /// The least product of the smallest eigenvalue's distances from the others (of a matrix of trace 1): the rounding of
 /// the determinant, some 1e-16, over its square turns the normal.
-const DOUBT_PLANE: f64 = 1e-5;
+const DOUBT_PLANE: f32 = 1e-5;
 
 impl Moments {
     /// Where the row at a place of the ring starts; its planes are a stride apart.
@@ -158,7 +159,7 @@ impl Sums for Moments {
                 let upper = Doubles(S::load_d(top.add(side))) - Doubles(S::load_d(top));
                 sums[c] = lower - upper;
             }
-            WindowMoments { sums, count: Doubles::splat((side * side) as f64) }
+            WindowMoments { sums, share: Doubles::splat(1.0 / (side * side) as f64) }
         }
     }
 
@@ -171,7 +172,7 @@ impl Sums for Moments {
                 let sum = S::select_bits_d(lanes, yes.sums[c].0, no.sums[c].0);
                 moments.sums[c] = Doubles(sum);
             }
-            moments.count = Doubles(S::select_bits_d(lanes, yes.count.0, no.count.0));
+            moments.share = Doubles(S::select_bits_d(lanes, yes.share.0, no.share.0));
         }
         moments
     }
@@ -183,14 +184,14 @@ impl Sums for Moments {
         for c in 1..CHANNELS {
             sums[c] = both(first.sums[c], second.sums[c]);
         }
-        WindowMoments { sums, count: both(first.count, second.count) }
+        WindowMoments { sums, share: both(first.share, second.share) }
     }
 
     #[inline(always)]
     unsafe fn none<S: Simd>() -> Self::Of8<S> {
         // SAFETY: as the caller's.
         let zero = unsafe { Doubles::splat(0.0) };
-        WindowMoments { sums: [zero; CHANNELS], count: zero }
+        WindowMoments { sums: [zero; CHANNELS], share: zero }
     }
 
     fn of_mirrored(
@@ -202,12 +203,13 @@ impl Sums for Moments {
         side: usize,
     ) -> Option<Self::Of1> {
         let half = (side / 2) as isize;
-        let mut moments = WindowMoments { sums: [0.0; CHANNELS], count: 0.0 };
+        let mut moments = WindowMoments { sums: [0.0; CHANNELS], share: 0.0 };
+        let mut count = 0;
         for rect in image.rects((x as isize - half, y as isize - half), (side, side)) {
             if rect.x.is_empty() || rect.y.is_empty() {
                 continue;
             }
-            moments.count += (rect.x.len() * rect.y.len()) as f64;
+            count += rect.x.len() * rect.y.len();
             for (c, sum) in moments.sums.iter_mut().enumerate() {
                 let segment = |end_row: usize| {
                     if end_row == 0 {
@@ -221,6 +223,7 @@ impl Sums for Moments {
                 *sum += segment(rect.y.end) - segment(rect.y.start);
             }
         }
+        moments.share = 1.0 / count as f64;
         Some(moments)
     }
 
@@ -231,8 +234,8 @@ impl Sums for Moments {
             for (to, one) in moments.sums.iter_mut().zip(one.sums) {
                 *to = Doubles(S::select_bits_d(1 << lane, S::splat_d(one), to.0));
             }
-            let count = S::splat_d(one.count);
-            moments.count = Doubles(S::select_bits_d(1 << lane, count, moments.count.0));
+            let share = S::splat_d(one.share);
+            moments.share = Doubles(S::select_bits_d(1 << lane, share, moments.share.0));
         }
     }
 
@@ -278,64 +281,67 @@ pub(crate) unsafe fn plane<S: Simd>(
 ) -> Found<S> {
     // SAFETY: as the caller's.
     unsafe {
-        let one = Doubles::<S>::splat(1.0);
         let [x, y, z, xx, xy, xz, yy, yz, zz] = moments.sums;
-        let share = one / moments.count;
-        let (mx, my, mz) = (x * share, y * share, z * share);
+        let (mx, my, mz) = (x * moments.share, y * moments.share, z * moments.share);
         let (xx, xy, xz) = (xx - x * mx, xy - x * my, xz - x * mz);
         let (yy, yz, zz) = (yy - y * my, yz - y * mz, zz - z * mz);
-        // Trace 1.
+        // A trace next to 1: floats divide in a quarter of the time.
         let trace = xx + yy + zz;
-        let scale = one / trace;
+        let scale = (Floats::splat(1.0) / trace.narrow()).widen();
         let (xx, xy, xz) = (xx * scale, xy * scale, xz * scale);
         let (yy, yz, zz) = (yy * scale, yz * scale, zz * scale);
 
-        // value^3 - value^2 + c1 value - c0 = 0
+        // value^3 - c2 value^2 + c1 value - c0 = 0
         let (minor_x, minor_y, minor_z) = (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
+        let c2 = xx + yy + zz;
         let c1 = minor_x + minor_y + minor_z;
         let c0 = xx * minor_x + xy * (xz * yz - xy * zz) + xz * (xy * yz - xz * yy);
         let mut value = {
-            let (c0, c1) = (c0.narrow(), c1.narrow());
-            let square = Floats::splat(4.0) * c1 * c1 - Floats::splat(12.0) * c0;
+            let (c0, c1, c2) = (c0.narrow(), c1.narrow(), c2.narrow());
+            let square = Floats::splat(4.0) * c1 * c1 - Floats::splat(12.0) * c0 * c2;
             let root = square.max(Floats::splat(0.0)).sqrt();
             (Floats::splat(3.0) * c0 / (c1 + root)).widen()
         };
-        let (two, three) = (one + one, one + one + one);
-        let (zero, converged) = (Doubles::splat(0.0), Doubles::splat(CONVERGED));
-        let (mut slope, mut unsettled) = (zero, lanes);
+        let twice = c2 + c2;
+        let (three, converged) = (Doubles::splat(3.0), Floats::splat(CONVERGED));
+        let (mut slope, mut unsettled) = (Floats::splat(0.0), lanes);
         for _ in 0..STEPS {
-            slope = (three * value - two) * value + c1;
-            let step = (((value - one) * value + c1) * value - c0) / slope;
-            value = value - step;
-            unsettled = !step.max(zero - step).lt(converged * slope) & lanes;
+            slope = ((three * value - twice) * value + c1).narrow();
+            // The steps grow small: floats tell how far they go.
+            let step = (((value - c2) * value + c1) * value - c0).narrow() / slope;
+            value = value - step.widen();
+            unsettled = !step.abs().lt(converged * slope) & lanes;
             if unsettled == 0 {
                 break;
             }
         }
-        let value = value.max(zero);
+        let value = value.max(Doubles::splat(0.0));
 
         // The adjugate of the matrix less the eigenvalue: each column is along the eigenvector.
         let (xx, yy, zz) = (xx - value, yy - value, zz - value);
         let (a_xx, a_yy, a_zz) = (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
         let (a_xy, a_xz, a_yz) = (xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz);
-        // The column with the longest diagonal element, scaled by it.
-        let best_xy = a_xx.max(a_yy);
-        let scale = one / best_xy.max(a_zz);
+        let (a_xx, a_yy, a_zz) = (a_xx.narrow(), a_yy.narrow(), a_zz.narrow());
+        let (a_xy, a_xz, a_yz) = (a_xy.narrow(), a_xz.narrow(), a_yz.narrow());
+        // The column with the longest diagonal element.
         let columns = [[a_xx, a_xy, a_xz], [a_xy, a_yy, a_yz], [a_xz, a_yz, a_zz]];
+        let best_xy = a_xx.max(a_yy);
+        let (is_y, is_z) = (S::lt(a_xx.0, a_yy.0), S::lt(best_xy.0, a_zz.0));
         let mut n = [Floats::splat(0.0); 3];
         for c in 0..3 {
-            let of_xy = a_xx.select_lt(a_yy, columns[1][c], columns[0][c]);
-            n[c] = (best_xy.select_lt(a_zz, columns[2][c], of_xy) * scale).narrow();
+            let of_xy = S::select(is_y, columns[1][c].0, columns[0][c].0);
+            n[c] = Floats(S::select(is_z, columns[2][c].0, of_xy));
         }
         let scale = Floats::splat(1.0) / dot(n, n).sqrt();
-        let least = Doubles::splat(DOUBT_SUMS * error);
+        let value = value.narrow();
+        let least = Floats::splat((DOUBT_SUMS * error) as f32);
         // Where the points lie on a line, the steps may end at the largest eigenvalue instead.
-        let is_smallest = value.lt(Doubles::splat(1.0 / 3.0));
-        let sums = least.lt(slope * trace) | fresh;
-        let sure = Doubles::splat(DOUBT_PLANE).lt(slope) & sums & is_smallest;
+        let is_smallest = value.lt(Floats::splat(1.0 / 3.0));
+        let sums = least.lt(slope * trace.narrow()) | fresh;
+        let sure = Floats::splat(DOUBT_PLANE).lt(slope) & sums & is_smallest;
         Found {
             normal: [n[0] * scale, n[1] * scale, n[2] * scale],
-            curvature: value.narrow(),
+            curvature: value,
             doubtful: !sure | unsettled,
         }
     }
@@ -363,8 +369,9 @@ unsafe fn integrate<S: Simd, const FACTORS: usize>(
             if FACTORS == 2 {
                 product = S::mul_d(product, S::load_d(factors[1].add(at)));
             }
-            let along = S::add_d(S::prefix_sum_d(product), carry);
-            carry = S::last_d(along);
+            let sum = S::prefix_sum_d(product);
+            let along = S::add_d(sum, carry);
+            carry = S::add_d(S::last_d(sum), carry);
             S::store_d(row.add(plane + at), S::add_d(along, S::load_d(above.add(plane + at))));
         }
     }

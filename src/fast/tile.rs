@@ -218,13 +218,13 @@ impl Tile<'_> {
         }
     }
 
-    /// A finite point in the tile: sums about it lose less.
+    /// A finite point near the tile's middle: sums about it lose less.
     fn origin<'r>(&self, sides: &impl Fn(usize) -> &'r [f32]) -> [f32; 3] {
-        for y in self.rows.clone() {
-            let row = &sides(y)[self.columns.clone()];
-            if let Some(at) = row.iter().position(|side| *side > 0.0) {
-                let point = self.points.at(self.columns.start + at, y);
-                return point.map(|c| if c.is_finite() { c } else { 0.0 });
+        let [(left, right), (above, below)] = [&self.columns, &self.rows].map(halves);
+        for y in below.chain(above.rev()) {
+            let has_window = |x: &usize| sides(y)[*x] > 0.0;
+            if let Some(x) = right.clone().chain(left.clone().rev()).find(has_window) {
+                return self.points.at(x, y).map(|c| if c.is_finite() { c } else { 0.0 });
             }
         }
         [0.0; 3]
@@ -471,6 +471,12 @@ impl Tile<'_> {
         let inner = (x.clamp(1, width - 2), y.clamp(1, height - 2));
         inner == (x, y) || sides(inner.1)[inner.0] as usize >= side
     }
+}
+
+/// A range's first and second half.
+fn halves(range: &Range<usize>) -> (Range<usize>, Range<usize>) {
+    let middle = range.start + range.len() / 2;
+    (range.start..middle, middle..range.end)
 }
 
 /// Eight pixels of a row and their windows.

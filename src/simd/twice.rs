@@ -36,6 +36,7 @@ impl<S: Simd> Simd for Twice<S> {
         or(a: F, b: F) -> F;
         xor(a: F, b: F) -> F;
         and_not(mask: F, a: F) -> F;
+        select(mask: F, yes: F, no: F) -> F;
         add_i(a: I, b: I) -> I;
         sub_i(a: I, b: I) -> I;
         prefix_sum_i(a: I) -> I;

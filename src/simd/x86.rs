@@ -406,6 +406,15 @@ impl Simd for Avx2 {
     }
 
     #[inline(always)]
+    unsafe fn select(mask: Self::F, yes: Self::F, no: Self::F) -> Self::F {
+        // Of bytes: what blends floats may become a masked store, which takes long on some processors.
+        unsafe {
+            let (mask, yes, no) =
+                (_mm256_castps_si256(mask), _mm256_castps_si256(yes), _mm256_castps_si256(no));
+            _mm256_castsi256_ps(_mm256_blendv_epi8(no, yes, mask))
+        }
+    }
+    #[inline(always)]
     unsafe fn transpose_halves([a, b, c, d]: [Self::F; 4]) -> [Self::F; 4] {
         unsafe {
             let (ab_low, cd_low) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));

@@ -86,12 +86,16 @@ impl Sums<MOMENTS> for CovarianceMatrix {
         let [x, y, z, count, xx, yy, zz, _, xy, yz, xz, _] = *sums;
         let sums = [x, y, z, xx, xy, xz, yy, yz, zz];
         // SAFETY: as the caller's.
-        unsafe { plane(&WindowMoments { sums, count }, error, lanes, fresh) }
+        unsafe {
+            let share = Doubles::splat(1.0) / count;
+            plane(&WindowMoments { sums, share }, error, lanes, fresh)
+        }
     }
 
     #[cold]
     fn afresh(points: &impl CleanPoints, rect: &Rect) -> Option<[f64; MOMENTS]> {
-        let WindowMoments { sums, count } = WindowMoments::of(points.finite(rect));
+        let WindowMoments { sums, share } = WindowMoments::of(points.finite(rect));
+        let count = 1.0 / share;
         let [x, y, z, xx, xy, xz, yy, yz, zz] = sums;
         Some([x, y, z, count, xx, yy, zz, count, xy, yz, xz, count])
     }
