@@ -99,8 +99,7 @@ impl EvenTile<'_> {
         let &Cloud { width, height, ref depths, .. } = self.cloud;
         let columns = reached(&self.columns, reach, width);
         let Range { start: top, end: bottom } = reached(&self.rows, reach, height);
-        let moments =
-            CovarianceMatrix { origin: [columns.start as f32, top as f32, self.origin()] };
+        let moments = CovarianceMatrix::about([columns.start as f32, top as f32, self.origin()]);
         rings.start(columns, top, rows_of_rings(reach, height));
         let mut next = top;
         for y in self.rows.clone().step_by(BLOCK) {
@@ -207,7 +206,7 @@ impl EvenTile<'_> {
         let (_, sums) = rings.parts();
         // SAFETY: as the caller's.
         unsafe {
-            let rects = Rects::new::<S>(&place, radii.0, false, false);
+            let rects = Rects::new::<S, MOMENTS>(&place, radii.0, false, false);
             let [sx, sy, sr, n, xx, yy, rr, _, xy, yr, xr, _] = rects.sums::<S, MOMENTS>(sums);
             let share = Doubles::splat(1.0) / n;
             let (mx, my, mr) = (sx * share, sy * share, sr * share);
@@ -226,7 +225,7 @@ impl EvenTile<'_> {
             let noise = unevenness * chance.widen();
             // The pixels' own positions.
             let column = columns::<S>(x).widen();
-            let [left, top, origin] = moments.origin.map(|o| Doubles::splat(f64::from(o)));
+            let [left, top, origin, _] = moments.origin.map(|o| Doubles::splat(o));
             let across = column - left - mx;
             let down = Doubles::splat(y as f64) - top - my;
             let inverse_depth = origin + mr + slope[0] * across + slope[1] * down;

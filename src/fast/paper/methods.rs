@@ -46,7 +46,14 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
 
 /// CM: moments about a point of the tile.
 pub(crate) struct CovarianceMatrix {
-    pub origin: [f32; 3],
+    /// x, y, z, 0.
+    pub origin: [f64; 4],
+}
+
+impl CovarianceMatrix {
+    pub fn about([x, y, z]: [f32; 3]) -> Self {
+        CovarianceMatrix { origin: [x.into(), y.into(), z.into(), 0.0] }
+    }
 }
 
 /// x, y, z, the number of points; xx, yy, zz, it again; xy, yz, zx, it again: fours, as sums are read.
@@ -55,13 +62,20 @@ pub(crate) const MOMENTS: usize = 12;
 impl Channels<MOMENTS> for CovarianceMatrix {
     #[inline(always)]
     fn of(&self, own: &Counted, _: [&Counted; 2], _: [&Counted; 2]) -> [f64; MOMENTS] {
-        let count = f64::from(own[3]);
-        let mut p = [0.0; 3];
-        for c in 0..3 {
-            p[c] = (f64::from(own[c]) - f64::from(self.origin[c])) * count;
+        // In fours, the point's count like a coordinate whose origin is 0.
+        let there = f64::from(own[3]);
+        let mut p = [0.0; 4];
+        for c in 0..4 {
+            p[c] = (f64::from(own[c]) - self.origin[c]) * there;
         }
-        let [x, y, z] = p;
-        [x, y, z, count, x * x, y * y, z * z, count, x * y, y * z, z * x, count]
+        let next = [p[1], p[2], p[0], p[3]];
+        let mut moments = [0.0; MOMENTS];
+        for c in 0..4 {
+            moments[c] = p[c];
+            moments[4 + c] = p[c] * p[c];
+            moments[8 + c] = p[c] * next[c];
+        }
+        moments
     }
 }
 

@@ -395,7 +395,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Task for TileTask<'a, '_, F> {
         unsafe {
             match tile.options.method {
                 Method::CovarianceMatrix => {
-                    let method = CovarianceMatrix { origin: tile.origin() };
+                    let method = CovarianceMatrix::about(tile.origin());
                     tile.compute::<S, _, MOMENTS>(&method, &mut scratch.moments, sink);
                 }
                 Method::AverageDepthChange => {

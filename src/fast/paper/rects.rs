@@ -24,7 +24,8 @@ pub(crate) struct Place {
 /// Indices of the elements that eight windows need.
 #[derive(Default)]
 pub(crate) struct Rects {
-    /// Of the sums up to the windows' upper left, upper right, lower left and lower right corners.
+    /// Of the sums up to the windows' upper left, upper right, lower left and lower right corners: of their first
+    /// channels.
     pub corners: [Indices; 4],
     /// Of the points at both ends of the middle row, and of the middle column.
     pub ends: [[Indices; 2]; 2],
@@ -39,12 +40,18 @@ pub(crate) struct Rects {
 pub(crate) const STEPS: [f32; GROUP] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 impl Rects {
-    /// Where eight windows lie, as `paper::smoothing_area::window` has them.
+    /// Where eight windows lie, as `paper::smoothing_area::window` has them, in rings of sums of `N` channels.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`. Indices are below 2^24.
+    /// The processor has the instruction set of `S`. Elements' indices are below 2^24.
     #[inline(always)]
-    pub unsafe fn new<S: Simd>(place: &Place, radii: S::F, inner: bool, ends: bool) -> Self {
+    pub unsafe fn new<S: Simd, const N: usize>(
+        place: &Place,
+        radii: S::F,
+        inner: bool,
+        ends: bool,
+    ) -> Self {
+        const { assert!(N.is_multiple_of(4)) };
         let mut rects = Rects { stride: place.stride, rows: place.rows, ..Rects::default() };
         // SAFETY: as the caller's; floats hold indices exactly.
         unsafe {
@@ -59,10 +66,17 @@ impl Rects {
             let (left, right) = (S::add(x[0], edge), S::sub(x[1], edge));
             let above = row_start::<S>(place, S::sub(S::add(y[0], edge), one));
             let last = row_start::<S>(place, S::sub(S::sub(y[1], edge), one));
-            store::<S>(&mut rects.corners[0], S::add(above, left));
-            store::<S>(&mut rects.corners[1], S::add(above, right));
-            store::<S>(&mut rects.corners[2], S::add(last, left));
-            store::<S>(&mut rects.corners[3], S::add(last, right));
+            let corners = [(above, left), (above, right), (last, left), (last, right)];
+            for (to, (row, column)) in rects.corners.iter_mut().zip(corners) {
+                let element = S::truncate_i(S::add(row, column));
+                let twice = S::add_i(element, element);
+                let four = S::add_i(twice, twice);
+                let mut channel = four;
+                for _ in 1..N / 4 {
+                    channel = S::add_i(channel, four);
+                }
+                S::store_i(to.as_mut_ptr(), channel);
+            }
             if ends {
                 // The element of a column's point is the next one.
                 let column = S::add(middle::<S>(place, x), one);
@@ -82,19 +96,18 @@ impl Rects {
     /// The sums over the eight windows (Eq. 3, not divided), channel by channel.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`; the corners are indices of `sums`.
+    /// The processor has the instruction set of `S`; the corners lie in `sums`.
     #[inline(always)]
     pub unsafe fn sums<S: Simd, const N: usize>(&self, sums: &[[f64; N]]) -> [Doubles<S>; N] {
         const { assert!(N.is_multiple_of(4)) };
-        debug_assert!(self.corners.as_flattened().iter().all(|at| (*at as usize) < sums.len()));
+        debug_assert!(self.corners.iter().flatten().all(|at| (*at as usize) < N * sums.len()));
+        let sums = sums.as_ptr().cast::<f64>();
         // SAFETY: as the caller's; an element has fours of channels.
         unsafe {
             let mut channels = [Doubles::splat(0.0); N];
             for first in (0..N).step_by(4) {
                 let at = |corner: &Indices, lane: usize| {
-                    let four = |lane: usize| {
-                        sums.as_ptr().add(corner[lane] as usize).cast::<f64>().add(first)
-                    };
+                    let four = |lane: usize| sums.add(corner[lane] as usize + first);
                     Doubles::<S>(S::load_halves_d(four(lane), four(lane + 4)))
                 };
                 let [a, b, c, d] = &self.corners;

@@ -117,7 +117,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 }
                 // Behind the last column radii mean nothing.
                 let eight = S::and(S::mask(windows), eight);
-                let rects = Rects::new::<S>(&place, eight, M::INNER, M::ENDS);
+                let rects = Rects::new::<S, N>(&place, eight, M::INNER, M::ENDS);
                 let mut sums = rects.sums::<S, N>(sums);
                 let mut fresh = 0;
                 let found = loop {
