@@ -93,13 +93,6 @@ impl<S: Simd> Doubles<S> {
         unsafe { S::bits_lt_d(self.0, other.0) }
     }
 
-    /// `self < other ? yes : no`
-    #[inline(always)]
-    pub fn select_lt(self, other: Self, yes: Self, no: Self) -> Self {
-        // SAFETY: there is a group, so there is the instruction set.
-        Doubles(unsafe { S::select_lt_d(self.0, other.0, yes.0, no.0) })
-    }
-
     #[inline(always)]
     pub fn narrow(self) -> Floats<S> {
         // SAFETY: there is a group, so there is the instruction set.

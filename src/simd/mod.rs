@@ -83,8 +83,6 @@ pub(crate) trait Simd: Copy {
     unsafe fn mul_d(a: Self::D, b: Self::D) -> Self::D;
     unsafe fn div_d(a: Self::D, b: Self::D) -> Self::D;
     unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D;
-    /// `a < b ? yes : no`
-    unsafe fn select_lt_d(a: Self::D, b: Self::D, yes: Self::D, no: Self::D) -> Self::D;
     /// Bit l is `a < b` in lane l.
     unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32;
     /// `lanes` bit l ? yes : no

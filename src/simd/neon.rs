@@ -289,14 +289,6 @@ impl Simd for Neon {
         unsafe { pick!(vcgtq_f64, vbslq_f64, a, b) }
     }
     #[inline(always)]
-    unsafe fn select_lt_d(a: Self::D, b: Self::D, yes: Self::D, no: Self::D) -> Self::D {
-        let mut lanes = no;
-        for i in 0..4 {
-            lanes[i] = unsafe { vbslq_f64(vcltq_f64(a[i], b[i]), yes[i], no[i]) };
-        }
-        lanes
-    }
-    #[inline(always)]
     unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32 {
         unsafe {
             let mask = |i: usize| vcltq_f64(a[i], b[i]);
@@ -464,7 +456,6 @@ mod tests {
                 S::mul_d(dx, dy),
                 S::div_d(dx, dy),
                 S::max_d(dx, dy),
-                S::select_lt_d(dx, dy, tenth, dy),
                 S::select_bits_d(bits, dx, dy),
                 // A zero's sign may get lost.
                 S::add_d(S::prefix_sum_d(S::mul_d(S::widen(small[0]), tenth)), S::splat_d(0.0)),

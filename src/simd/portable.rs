@@ -251,14 +251,6 @@ impl Simd for Portable {
         zip(a, b, |a, b| if a > b { a } else { b })
     }
     #[inline(always)]
-    unsafe fn select_lt_d(a: D, b: D, yes: D, no: D) -> D {
-        let mut lanes = no;
-        for l in 0..GROUP {
-            lanes[l] = if a[l] < b[l] { yes[l] } else { no[l] };
-        }
-        lanes
-    }
-    #[inline(always)]
     unsafe fn bits_lt_d(a: D, b: D) -> u32 {
         (0..GROUP).fold(0, |bits, l| bits | u32::from(a[l] < b[l]) << l)
     }

@@ -49,7 +49,6 @@ impl<S: Simd> Simd for Twice<S> {
         mul_d(a: D, b: D) -> D;
         div_d(a: D, b: D) -> D;
         max_d(a: D, b: D) -> D;
-        select_lt_d(a: D, b: D, yes: D, no: D) -> D;
         prefix_sum_d(a: D) -> D;
         last_d(a: D) -> D;
         widen(a: F) -> D;

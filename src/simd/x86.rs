@@ -240,13 +240,6 @@ impl Simd for Sse2 {
         unsafe { each!(_mm_max_pd, a, b) }
     }
     #[inline(always)]
-    unsafe fn select_lt_d(a: Self::D, b: Self::D, yes: Self::D, no: Self::D) -> Self::D {
-        unsafe {
-            let mask = each!(_mm_cmplt_pd, a, b);
-            each!(_mm_or_pd, each!(_mm_and_pd, mask, yes), each!(_mm_andnot_pd, mask, no))
-        }
-    }
-    #[inline(always)]
     unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32 {
         let mut bits = 0;
         for (i, (a, b)) in a.into_iter().zip(b).enumerate() {
@@ -517,17 +510,6 @@ impl Simd for Avx2 {
     #[inline(always)]
     unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D {
         unsafe { each!(_mm256_max_pd, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn select_lt_d(a: Self::D, b: Self::D, yes: Self::D, no: Self::D) -> Self::D {
-        let mut lanes = no;
-        for i in 0..2 {
-            unsafe {
-                let mask = _mm256_cmp_pd::<_CMP_LT_OQ>(a[i], b[i]);
-                lanes[i] = _mm256_blendv_pd(no[i], yes[i], mask);
-            }
-        }
-        lanes
     }
     #[inline(always)]
     unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32 {
