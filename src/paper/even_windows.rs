@@ -88,13 +88,10 @@ impl Asked<'_> {
         let (x, y) = (block % across, block / across);
         visit(block);
         for radius in self.radii(block) {
-            let (left, right) = places(x, radius as usize, across);
-            let (up, down) = places(y, radius as usize, down);
-            // Of windows that are worth the same, the one at the middle of an edge is nearer.
-            let edges = [(left, y), (right, y), (x, up), (x, down)];
-            let corners = [(left, up), (right, up), (left, down), (right, down)];
-            for (x, y) in edges.into_iter().chain(corners) {
-                visit(y * across + x);
+            let columns = places(x, radius as usize, across);
+            let rows = places(y, radius as usize, down).map(|row| row * across);
+            for (column, row) in PLACES {
+                visit(rows[row] + columns[column]);
             }
         }
     }
@@ -114,12 +111,16 @@ impl Asked<'_> {
     }
 }
 
-/// The columns or rows of blocks, of so many, before and behind block `at` at the places of windows of a radius.
-#[inline(always)]
-pub(crate) fn places(at: usize, radius: usize, count: usize) -> (usize, usize) {
+/// The columns or rows of blocks, of so many, at the places of windows of a radius: before block `at`, its own, behind.
+fn places(at: usize, radius: usize, count: usize) -> [usize; 3] {
     let distance = radius.div_ceil(BLOCK);
-    (at.saturating_sub(distance), (at + distance).min(count - 1))
+    [at.saturating_sub(distance), at, (at + distance).min(count - 1)]
 }
+
+/// Those of the places around a block, 0 before it, 1 its own, 2 behind it. Of windows that are worth the same, the one
+/// at the middle of an edge is nearer.
+pub(crate) const PLACES: [(usize, usize); 8] =
+    [(0, 1), (2, 1), (1, 0), (1, 2), (0, 0), (2, 0), (0, 2), (2, 2)];
 
 /// The even windows of the needed blocks: the plain form.
 pub(crate) fn even_windows<'a>(

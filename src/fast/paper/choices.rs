@@ -4,14 +4,12 @@
 use crate::fast::arithmetic::Floats;
 use crate::fast::tile::Bits;
 use crate::paper::{
-    BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, JITTER, MISFIT, NEAR, NEAR_NOISE, REACH,
-    inverse_depth, places,
+    BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, JITTER, MISFIT, NEAR, NEAR_NOISE, PLACES, REACH,
+    inverse_depth,
 };
 use crate::simd::{GROUP, Simd};
 
-/// Columns and rows of the places around a block, 0 before it, 1 its own, 2 behind it, in the plain form's order.
-const PLACES: [(usize, usize); 8] =
-    [(0, 1), (2, 1), (1, 0), (1, 2), (0, 0), (2, 0), (0, 2), (2, 2)];
+use super::rects::STEPS;
 
 /// Finds the choices of the pixels of a row of blocks, which are none so far.
 ///
@@ -50,12 +48,21 @@ struct Group<'a> {
     count: usize,
 }
 
+/// Columns or rows of blocks, one for each of eight.
+#[derive(Clone, Copy)]
+struct Lines<S: Simd> {
+    /// The number of the first block in the row, or that of the column.
+    first: [usize; GROUP],
+    /// The ways in pixels to the eight's own.
+    to_own: Floats<S>,
+}
+
 /// Windows that the pixels of eight blocks may take, one each.
 struct Candidates<S: Simd> {
     /// The blocks whose windows they are.
     places: [u32; GROUP],
-    /// Which of the eight may take theirs.
-    lanes: u32,
+    /// The mask of the blocks that may take theirs.
+    may_take: S::F,
     /// The ways from the windows' pixels to the eight blocks' first.
     to_first: [Floats<S>; 2],
     radius: Floats<S>,
@@ -65,7 +72,7 @@ struct Candidates<S: Simd> {
     unevenness: Floats<S>,
     per_noise: Floats<S>,
     per_bend: Floats<S>,
-    /// What the windows cost any pixel, once the noise is known.
+    /// What the windows cost any pixel, once the noise is known; infinite for those that may not take theirs.
     even: Floats<S>,
     /// How far the sensor's noise along rows and columns moves points off the plane.
     jitter: Floats<S>,
@@ -87,10 +94,11 @@ impl<S: Simd> Candidates<S> {
         // SAFETY: as the caller's.
         let zero = unsafe { Floats::splat(0.0) };
         let [radius, at_first, unevenness, per_noise, per_bend, even, jitter] = [zero; 7];
-        let (places, lanes, to_first, slope) = ([0; GROUP], 0, [zero; 2], [zero; 2]);
+        let (places, may_take) = ([0; GROUP], zero.0);
+        let (to_first, slope) = ([zero; 2], [zero; 2]);
         Candidates {
             places,
-            lanes,
+            may_take,
             to_first,
             radius,
             at_first,
@@ -114,55 +122,58 @@ struct Found<S: Simd> {
 }
 
 impl<S: Simd> Found<S> {
-    /// Adds the windows of the blocks at places from which `to_first` leads to those of these `lanes`.
+    /// Adds the windows of the blocks in these columns and rows, for the eight blocks of a mask.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`; the places are inside the image.
+    /// The processor has the instruction set of `S`; the columns and rows are inside the image.
     #[inline(always)]
     unsafe fn add(
         &mut self,
         windows: &[EvenWindow],
-        places: [u32; GROUP],
-        to_first: [Floats<S>; 2],
-        lanes: u32,
+        columns: &Lines<S>,
+        rows: &Lines<S>,
+        may_take: S::F,
     ) {
         const { assert!(size_of::<EvenWindow>() == 8 * size_of::<f32>()) };
-        debug_assert!(places.iter().all(|place| (*place as usize) < windows.len()));
-        let windows = windows.as_ptr().cast::<f32>();
+        let place = |lane: usize| columns.first[lane] + rows.first[lane];
+        debug_assert!((0..GROUP).all(|lane| place(lane) < windows.len()));
+        let windows = windows.as_ptr();
         if self.number == self.candidates.len() {
             // SAFETY: as the caller's.
             self.candidates.push(unsafe { Candidates::none() });
         }
         let to = &mut self.candidates[self.number];
         self.number += 1;
+        for lane in 0..GROUP {
+            to.places[lane] = place(lane) as u32;
+        }
         // SAFETY: as the caller's; a window is eight floats.
         unsafe {
             let (mut front, mut back) = ([S::splat(0.0); 4], [S::splat(0.0); 4]);
             for i in 0..4 {
-                let at = |lane: usize| windows.add(8 * places[lane] as usize);
+                let at = |lane: usize| windows.add(place(lane)).cast::<f32>();
                 let (low, high) = (at(i), at(i + 4));
                 front[i] = S::load_halves(low, high);
                 back[i] = S::load_halves(low.add(4), high.add(4));
             }
             let [radius, inverse_depth, across, down] = S::transpose_halves(front);
             let [unevenness, noise, per_noise, per_bend] = S::transpose_halves(back);
-            let zero = Floats::splat(0.0);
-            let radius = Floats(radius);
-            let distance = to_first[0].abs().max(to_first[1].abs());
-            let near = distance.lt(radius + Floats::splat(REACH + 1.0));
-            to.places = places;
-            to.lanes = lanes & zero.lt(radius) & near;
-            to.to_first = to_first;
-            to.radius = radius;
             let (across, down) = (Floats(across), Floats(down));
-            to.at_first = Floats(inverse_depth) + across * to_first[0] + down * to_first[1];
+            let [dx, dy] = [columns.to_own, rows.to_own];
+            let reach = Floats::<S>(radius) + Floats::splat(REACH + 1.0);
+            let is_near = S::lt(dx.abs().max(dy.abs()).0, reach.0);
+            let is_there = S::lt(S::splat(0.0), radius);
+            to.may_take = S::and(may_take, S::and(is_near, is_there));
+            to.to_first = [dx, dy];
+            to.radius = Floats(radius);
+            to.at_first = Floats(inverse_depth) + across * dx + down * dy;
             to.slope = [across, down];
             to.jitter = Floats::splat(JITTER) * (across * across + down * down).sqrt();
             to.unevenness = Floats(unevenness);
             to.per_noise = Floats(per_noise);
             to.per_bend = Floats(per_bend);
             let less = S::min(noise, self.noise.0);
-            self.noise.0 = S::select(S::mask(to.lanes), less, self.noise.0);
+            self.noise.0 = S::select(to.may_take, less, self.noise.0);
         }
     }
 
@@ -177,8 +188,10 @@ impl<S: Simd> Found<S> {
             self.noise = self.noise.max(Floats::splat(least_noise));
             for candidates in &mut self.candidates[..self.number] {
                 let misfit = (candidates.unevenness - self.noise).max(Floats::splat(0.0));
-                candidates.even = self.noise * candidates.per_noise
+                let even = self.noise * candidates.per_noise
                     + Floats::splat(MISFIT) * misfit * candidates.per_bend;
+                let never = S::splat(f32::INFINITY);
+                candidates.even = Floats(S::select(candidates.may_take, even.0, never));
             }
         }
     }
@@ -194,75 +207,53 @@ impl Group<'_> {
         let &Group { even, row, first, count } = self;
         let Blocks { across, down, .. } = even.asked.blocks;
         let own = row * across + first;
-        let levels = &even.asked.levels[own..own + count];
-        let mut lanes = 0;
-        for (lane, levels) in levels.iter().enumerate() {
-            lanes |= u32::from(*levels > 0) << lane;
-        }
-        found.number = 0;
-        if lanes == 0 {
-            return;
-        }
-        // Lanes outside the image stand for the last block of the row.
-        let mut columns = [0; GROUP];
-        let mut radii = [0; GROUP];
-        for (lane, column) in columns.iter_mut().enumerate() {
-            *column = (first + lane).min(across - 1);
-        }
-        for lane in Bits(lanes) {
-            radii[lane] = even.asked.largest(own + lane) as usize;
-        }
-        let mut at_columns = [columns; 3];
-        let mut at_rows = [[row; GROUP]; 3];
-        // SAFETY: as the caller's; all places are inside the image.
-        unsafe {
-            found.noise = Floats::splat(f32::INFINITY);
-            self.add(found, [&columns; 2], [&[row; GROUP]; 2], lanes);
-            for level in 0.. {
-                let mut active = 0;
-                for lane in Bits(lanes) {
-                    let there = radii[lane] > 0 && levels[lane] > level;
-                    active |= u32::from(there) << lane;
-                }
-                if active == 0 {
-                    break;
-                }
-                for lane in 0..GROUP {
-                    let (left, right) = places(columns[lane], radii[lane], across);
-                    let (up, down) = places(row, radii[lane], down);
-                    (at_columns[0][lane], at_columns[2][lane]) = (left, right);
-                    (at_rows[0][lane], at_rows[2][lane]) = (up, down);
-                }
-                for (column, row) in PLACES {
-                    let at_columns = [&columns, &at_columns[column]];
-                    self.add(found, at_columns, [&at_rows[1], &at_rows[row]], active);
-                }
-                for radius in &mut radii {
-                    *radius /= 2;
-                }
+        let (mut levels, mut radii) = ([0.0; GROUP], [0.0; GROUP]);
+        for lane in 0..count {
+            let level = even.asked.levels[own + lane];
+            levels[lane] = f32::from(level);
+            if level > 0 {
+                radii[lane] = even.asked.largest(own + lane) as f32;
             }
         }
-    }
-
-    /// Adds the windows at places of these `lanes`' blocks: columns and rows of blocks, the eight's own first.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`; the places are inside the image.
-    #[inline(always)]
-    unsafe fn add<S: Simd>(
-        &self,
-        found: &mut Found<S>,
-        columns: [&[usize; GROUP]; 2],
-        rows: [&[usize; GROUP]; 2],
-        lanes: u32,
-    ) {
-        let mut places = [0; GROUP];
-        for lane in 0..GROUP {
-            places[lane] =
-                (rows[1][lane] * self.even.asked.blocks.across + columns[1][lane]) as u32;
+        found.number = 0;
+        // SAFETY: as the caller's; all places are inside the image.
+        unsafe {
+            let zero = Floats::<S>::splat(0.0);
+            found.noise = Floats::splat(f32::INFINITY);
+            let levels = S::load(levels.as_ptr());
+            let mut radii = Floats::<S>(S::load(radii.as_ptr()));
+            let mut level = 0.0;
+            let mut may_take = S::lt(zero.0, levels);
+            if S::bits(may_take) == 0 {
+                return;
+            }
+            // Lanes outside the image stand for the last block of the row.
+            let last = Floats::<S>::splat((across - 1) as f32);
+            let column = Floats::<S>(S::load(STEPS.as_ptr())) + Floats::splat(first as f32);
+            let column = Floats::<S>(S::min(column.0, last.0));
+            let row = Floats::<S>::splat(row as f32);
+            let own = [lines::<S>(column, column, 1), lines(row, row, across)];
+            found.add(even.windows, &own[0], &own[1], may_take);
+            loop {
+                may_take = S::and(S::lt(zero.0, radii.0), S::lt(S::splat(level), levels));
+                if S::bits(may_take) == 0 {
+                    break;
+                }
+                // Rounded up.
+                let distance =
+                    (radii + Floats::splat(BLOCK as f32 - 1.0)) / Floats::splat(BLOCK as f32);
+                let distance = Floats(S::truncate(distance.0));
+                let [left, right] = around(column, distance, across, 1);
+                let [above, below] = around(row, distance, down, across);
+                let columns = [&left, &own[0], &right];
+                let rows = [&above, &own[1], &below];
+                for (column, row) in PLACES {
+                    found.add(even.windows, columns[column], rows[row], may_take);
+                }
+                radii = Floats(S::truncate((radii * Floats::splat(0.5)).0));
+                level += 1.0;
+            }
         }
-        // SAFETY: as the caller's.
-        unsafe { found.add(self.even.windows, places, [ways(columns), ways(rows)], lanes) };
     }
 
     /// Of the windows `found`, those that are worth most to the blocks' pixels in this column and row of theirs, for
@@ -297,7 +288,7 @@ impl Group<'_> {
             let tolerance = Floats(S::load(tolerances.as_ptr()));
             let near_noise = Floats::splat(NEAR_NOISE) * found.noise / near.points;
             let at_near = [column + near.offset[0], row + near.offset[1]];
-            let mut least = Floats::splat(f32::INFINITY);
+            let mut least = Floats::<S>::splat(f32::INFINITY);
             let mut best = S::splat(-1.0);
             let found = &found.candidates[..found.number];
             for (number, candidates) in found.iter().enumerate() {
@@ -311,9 +302,10 @@ impl Group<'_> {
                 let short = (distance - candidates.radius).max(zero);
                 let cost = (candidates.even + astray * per_astray) * (one + short * short);
                 let at_pixel = candidates.at_first + across * column + down * row;
-                let lies_in = (near.own - at_pixel).abs().lt(tolerance + candidates.jitter);
-                let can_take = candidates.lanes & (lies_in | !zero.lt(short));
-                let better = S::mask(cost.lt(least) & can_take);
+                let astray = (near.own - at_pixel).abs();
+                let lies_in = S::lt(astray.0, (tolerance + candidates.jitter).0);
+                let is_worse = S::and_not(lies_in, S::lt(zero.0, short.0));
+                let better = S::and_not(is_worse, S::lt(cost.0, least.0));
                 least.0 = S::select(better, cost.0, least.0);
                 best = S::select(better, S::splat(number as f32), best);
             }
@@ -327,18 +319,38 @@ impl Group<'_> {
     }
 }
 
-/// The ways in pixels from the second of these columns or rows of blocks to the first.
+/// The columns or rows `at`, which lie `number` blocks apart, on the way to those of the eight blocks.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn ways<S: Simd>([to, from]: [&[usize; GROUP]; 2]) -> Floats<S> {
-    let mut ways = [0.0; GROUP];
-    for lane in 0..GROUP {
-        ways[lane] = (to[lane] as f32 - from[lane] as f32) * BLOCK as f32;
-    }
+unsafe fn lines<S: Simd>(own: Floats<S>, at: Floats<S>, number: usize) -> Lines<S> {
+    let mut first = [0; GROUP];
     // SAFETY: as the caller's.
-    Floats(unsafe { S::load(ways.as_ptr()) })
+    let to_own = unsafe {
+        S::store_i(first.as_mut_ptr(), S::truncate_i(at.0));
+        (own - at) * Floats::splat(BLOCK as f32)
+    };
+    Lines { first: first.map(|line| line as usize * number), to_own }
+}
+
+/// The columns or rows, of so many, at distances before and behind the eight blocks' own.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn around<S: Simd>(
+    own: Floats<S>,
+    distance: Floats<S>,
+    count: usize,
+    number: usize,
+) -> [Lines<S>; 2] {
+    // SAFETY: as the caller's.
+    unsafe {
+        let before = Floats(S::max((own - distance).0, S::splat(0.0)));
+        let behind = Floats(S::min((own + distance).0, S::splat((count - 1) as f32)));
+        [lines(own, before, number), lines(own, behind, number)]
+    }
 }
 
 /// The inverse depths of a row of blocks, and of the pixels' rows above and below.
