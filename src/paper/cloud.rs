@@ -26,9 +26,11 @@ impl Cloud {
     pub fn read(&mut self, points: &Points, options: &Options) {
         let (width, height) = (points.width(), points.height());
         (self.width, self.height) = (width, height);
-        let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
         let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
-        refill(&mut self.points, pixels.map(|(x, y)| cleaned.at(x, y)));
+        self.points.clear();
+        for y in 0..height {
+            self.points.extend((0..width).map(|x| cleaned.at(x, y)));
+        }
         let range = options.semantics == Semantics::Paper && options.paper.depth == Depth::Range;
         let depth = |&[x, y, z]: &[f32; 3]| if range { (x * x + y * y + z * z).sqrt() } else { z };
         refill(&mut self.depths, self.points.iter().map(depth));

@@ -27,32 +27,30 @@ pub(crate) struct DepthChanges {
 
 impl DepthChanges {
     /// The changes of a cloud: `is_change(depth, difference, gap)` says whether a difference in depth to the
-    /// neighbour `gap` pixels to the right or below is one.
+    /// neighbour `gap` pixels to the right or below is one; no NaN is.
     pub fn find(cloud: &Cloud, is_change: impl Fn(f32, f32, usize) -> bool) -> Self {
         let (width, height) = (cloud.width, cloud.height);
         let mut right = vec![false; width * height];
         let mut below = vec![false; width * height];
-        // Along a row or column: the last finite depth, and where it was.
-        let scan = |map: &mut [bool], first: usize, step: usize, count: usize| {
-            let mut last: Option<(usize, f32)> = None;
-            for i in 0..count {
-                let depth = cloud.depths[first + i * step];
+        // The last finite depth of the row, and of every column, and where it was; the first are compared with NaN.
+        let mut lowest = vec![(0, f32::NAN); width];
+        for y in 0..height {
+            let mut last = (0, f32::NAN);
+            let first = y * width;
+            for (x, depth) in cloud.depths[first..first + width].iter().enumerate() {
                 if depth.is_nan() {
                     continue;
                 }
-                if let Some((from, before)) = last
-                    && is_change(before, depth - before, i - from)
-                {
-                    map[first + (i - 1) * step] = true;
+                let is_change =
+                    |(from, before): (usize, f32), at| is_change(before, depth - before, at - from);
+                if is_change(last, x) {
+                    right[first + x - 1] = true;
                 }
-                last = Some((i, depth));
+                if is_change(lowest[x], y) {
+                    below[first + x - width] = true;
+                }
+                (last, lowest[x]) = ((x, *depth), (y, *depth));
             }
-        };
-        for y in 0..height {
-            scan(&mut right, y * width, 1, width);
-        }
-        for x in 0..width {
-            scan(&mut below, x, width, height);
         }
         DepthChanges { width, height, right, below }
     }
