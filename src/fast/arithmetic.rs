@@ -45,6 +45,14 @@ impl<S: Simd> Floats<S> {
         Floats(unsafe { S::splat(value) })
     }
 
+    /// # Safety
+    /// The processor has the instruction set of `S`; there are eight floats.
+    #[inline(always)]
+    pub unsafe fn load(from: *const f32) -> Self {
+        // SAFETY: as the caller's.
+        Floats(unsafe { S::load(from) })
+    }
+
     #[inline(always)]
     pub fn max(self, other: Self) -> Self {
         // SAFETY: there is a group, so there is the instruction set.

@@ -45,20 +45,6 @@ impl HalfWindows {
     }
 }
 
-/// # Safety
-/// The processor has the instruction set of `S`; the planes hold row `y` and the group at index `at`.
-#[inline(always)]
-unsafe fn point<S: Simd>(
-    frame: &Frame,
-    planes: &Planes,
-    c: usize,
-    y: usize,
-    at: usize,
-) -> Floats<S> {
-    // SAFETY: as the caller's.
-    Floats(unsafe { S::load(planes.row(frame, c, y).as_ptr().add(at)) })
-}
-
 impl Sums for HalfWindows {
     type Of8<S: Simd> = Tangents<Floats<S>>;
     type Of1 = Tangents<f32>;
@@ -129,11 +115,12 @@ impl Sums for HalfWindows {
             let (next, before) = (x + quarter + 1, x - quarter - 1);
             let (above, below) = (y - quarter, y + quarter);
             let mut tangents = [[across.narrow(); 3], [along.narrow(); 3]];
+            let [own, above, below] = [y, above, below].map(|y| planes.start(frame, y));
             for c in 0..2 {
-                tangents[0][c] =
-                    point::<S>(frame, planes, c, y, next) - point(frame, planes, c, y, before);
-                tangents[1][c] = point::<S>(frame, planes, c, below, x + 1)
-                    - point(frame, planes, c, above, x - 1);
+                let point = |row: *const f32, x: usize| row.add(c * frame.stride + x);
+                tangents[0][c] = Floats::load(point(own, next)) - Floats::load(point(own, before));
+                tangents[1][c] =
+                    Floats::load(point(below, x + 1)) - Floats::load(point(above, x - 1));
             }
             tangents
         }

@@ -116,7 +116,7 @@ impl Sums for Moments {
                 let origin = Floats::<S>::splat(self.origin[c]).widen();
                 for group in 0..groups {
                     let at = MARGIN + group * GROUP;
-                    let coordinate = Floats::<S>(S::load(from[c].as_ptr().add(at))).widen();
+                    let coordinate = Floats::<S>::load(from[c].as_ptr().add(at)).widen();
                     S::store_d(centered.add(c * stride + at), (coordinate - origin).0);
                 }
             }

@@ -79,6 +79,12 @@ impl Planes {
         self.data.capacity() * size_of::<f32>()
     }
 
+    /// Where row `y`'s planes start: a stride apart.
+    #[inline(always)]
+    pub fn start(&self, frame: &Frame, y: usize) -> *const f32 {
+        self.data.as_ptr().wrapping_add(frame.place(y) * 3 * frame.stride)
+    }
+
     /// Row `y`'s plane of coordinate `c`.
     #[inline(always)]
     pub fn row(&self, frame: &Frame, c: usize, y: usize) -> &[f32] {

@@ -285,9 +285,9 @@ impl Tile<'_> {
                     }
                     let column = frame.column(group.x);
                     let point = [
-                        Floats(S::load(planes_row[0].as_ptr().add(column))),
-                        Floats(S::load(planes_row[1].as_ptr().add(column))),
-                        Floats(S::load(planes_row[2].as_ptr().add(column))),
+                        Floats::load(planes_row[0].as_ptr().add(column)),
+                        Floats::load(planes_row[1].as_ptr().add(column)),
+                        Floats::load(planes_row[2].as_ptr().add(column)),
                     ];
                     let normal = [
                         Floats(found.normal[0].0[g]),

@@ -221,7 +221,7 @@ impl Group<'_> {
             let zero = Floats::<S>::splat(0.0);
             found.noise = Floats::splat(f32::INFINITY);
             let levels = S::load(levels.as_ptr());
-            let mut radii = Floats::<S>(S::load(radii.as_ptr()));
+            let mut radii = Floats::<S>::load(radii.as_ptr());
             let mut level = 0.0;
             let mut may_take = S::lt(zero.0, levels);
             if S::bits(may_take) == 0 {
@@ -229,7 +229,7 @@ impl Group<'_> {
             }
             // Lanes outside the image stand for the last block of the row.
             let last = Floats::<S>::splat((across - 1) as f32);
-            let column = Floats::<S>(S::load(STEPS.as_ptr())) + Floats::splat(first as f32);
+            let column = Floats::<S>::load(STEPS.as_ptr()) + Floats::splat(first as f32);
             let column = Floats::<S>(S::min(column.0, last.0));
             let row = Floats::<S>::splat(row as f32);
             let own = [lines::<S>(column, column, 1), lines(row, row, across)];
@@ -285,7 +285,7 @@ impl Group<'_> {
             let near = neighbours.near::<S>(self.first, [column, row], clean);
             let (zero, one) = (Floats::splat(0.0), Floats::splat(1.0));
             let [column, row] = [column, row].map(|at| Floats::splat(at as f32));
-            let tolerance = Floats(S::load(tolerances.as_ptr()));
+            let tolerance = Floats::load(tolerances.as_ptr());
             let near_noise = Floats::splat(NEAR_NOISE) * found.noise / near.points;
             let at_near = [column + near.offset[0], row + near.offset[1]];
             let mut least = Floats::<S>::splat(f32::INFINITY);

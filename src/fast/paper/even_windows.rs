@@ -151,8 +151,7 @@ impl EvenTile<'_> {
         }
         // SAFETY: as the caller's.
         unsafe {
-            let (wanted, clean) =
-                (Floats(S::load(wanted.as_ptr())), Floats(S::load(clean.as_ptr())));
+            let (wanted, clean) = (Floats::load(wanted.as_ptr()), Floats::load(clean.as_ptr()));
             let mut found = Fits::<S>::none();
             // On steep surfaces, windows with depth changes.
             let smallest = Floats::splat(JAGGED_RADIUS as f32 - 1.0);
@@ -168,7 +167,7 @@ impl EvenTile<'_> {
                 todo &= !jagged & clean.lt(radii) & smallest.lt(radii);
             }
             // Windows without, and smaller ones while those are much more even.
-            radii = Floats(S::load(largest.as_ptr()));
+            radii = Floats::load(largest.as_ptr());
             todo = Floats::splat(0.0).lt(radii) & !done;
             let least = Doubles::splat(f64::from(self.asked.least_noise));
             let mut is_first = true;
@@ -267,9 +266,7 @@ impl EvenTile<'_> {
 #[inline(always)]
 unsafe fn columns<S: Simd>(x: usize) -> Floats<S> {
     // SAFETY: as the caller's.
-    unsafe {
-        Floats(S::load(STEPS.as_ptr())) * Floats::splat(BLOCK as f32) + Floats::splat(x as f32)
-    }
+    unsafe { Floats::load(STEPS.as_ptr()) * Floats::splat(BLOCK as f32) + Floats::splat(x as f32) }
 }
 
 /// How many columns or rows, of so many, windows around `at` have.

@@ -253,7 +253,7 @@ unsafe fn outermost<S: Simd>(
     unsafe {
         let [first, last] = &rects.ends[line];
         let (a, b) = (gather::<S>(points, first), gather::<S>(points, last));
-        let span = Floats(S::load(rects.spans[line].as_ptr()));
+        let span = Floats::load(rects.spans[line].as_ptr());
         let found = [b[0] - a[0], b[1] - a[1], span];
         let missing = (a[3] * b[3]).lt(Floats::splat(1.0)) & lanes;
         if missing == 0 {
@@ -269,7 +269,7 @@ unsafe fn outermost<S: Simd>(
                 fields[c][lane] = one[c];
             }
         }
-        let load = |c: usize| Floats(S::load(fields[c].as_ptr()));
+        let load = |c: usize| Floats::load(fields[c].as_ptr());
         [load(0), load(1), load(2)]
     }
 }
