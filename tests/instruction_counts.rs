@@ -34,7 +34,7 @@ const BOUNDS: [(Semantics, Method, BorderPolicy, u64, u64); 10] = [
     (Pcl, AverageDepthChange, Ignore, 135, 209),
     (Pcl, AverageDepthChange, Mirror, 289, 343),
     (Pcl, Simple3DGradient, Ignore, 113, 186),
-    (Paper, CovarianceMatrix, Ignore, 282, 486),
+    (Paper, CovarianceMatrix, Ignore, 271, 486),
     (Paper, Average3DGradient, Ignore, 235, 348),
     (Paper, AverageDepthChange, Ignore, 221, 368),
 ];
