@@ -7,7 +7,7 @@ use crate::cloud::{Normals, Points};
 use crate::depth_change::depth_change_map;
 use crate::distance::distance_map;
 use crate::eigenvalues::eigenvalue_map;
-use crate::fast::{self, SMALLEST_IMAGE, Scratch};
+use crate::fast::{self, SIZES, Scratch};
 use crate::isa::Isa;
 use crate::methods::{Estimate, estimate, estimate_window, start};
 use crate::options::{Method, Options, Semantics};
@@ -70,9 +70,10 @@ impl Estimator {
         self.isa
     }
 
-    /// Whether the plain form computes: because it was asked for, or the image is tiny.
+    /// Whether the plain form computes: because it was asked for, or the image is tiny or too long.
     fn is_plain(&self, points: &Points) -> bool {
-        self.isa == Isa::Scalar || points.width().min(points.height()) < SMALLEST_IMAGE
+        self.isa == Isa::Scalar
+            || ![points.width(), points.height()].iter().all(|size| SIZES.contains(size))
     }
 
     /// The options.

@@ -16,7 +16,7 @@ mod strips;
 mod tile;
 mod windows;
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -40,8 +40,8 @@ use crate::smoothing_area::depth_smoothing;
 use crate::threads::Workers;
 use crate::window::Image;
 
-/// Images smaller than this in one direction are left to the plain form.
-pub(crate) const SMALLEST_IMAGE: usize = 3;
+/// Columns and rows of the images that are not left to the plain form. Floats hold them.
+pub(crate) const SIZES: RangeInclusive<usize> = 3..=1 << 24;
 
 /// Rows of a tile: those around it that its windows reach are read again for the next one.
 const TILE_ROWS: usize = 256;

@@ -302,8 +302,8 @@ impl Group<'_> {
                 let short = (distance - candidates.radius).max(zero);
                 let cost = (candidates.even + astray * per_astray) * (one + short * short);
                 let at_pixel = candidates.at_first + across * column + down * row;
-                let astray = (near.own - at_pixel).abs();
-                let lies_in = S::lt(astray.0, (tolerance + candidates.jitter).0);
+                let off = (near.own - at_pixel).abs();
+                let lies_in = S::lt(off.0, (tolerance + candidates.jitter).0);
                 let is_worse = S::and_not(lies_in, S::lt(zero.0, short.0));
                 let better = S::and_not(is_worse, S::lt(cost.0, least.0));
                 least.0 = S::select(better, cost.0, least.0);
