@@ -73,7 +73,7 @@ impl Estimator {
     /// Whether the plain form computes: because it was asked for, or the image is tiny or too long.
     fn is_plain(&self, points: &Points) -> bool {
         self.isa == Isa::Scalar
-            || ![points.width(), points.height()].iter().all(|size| SIZES.contains(size))
+            || !(SIZES.contains(&points.width()) && SIZES.contains(&points.height()))
     }
 
     /// The options.

@@ -76,9 +76,7 @@ impl Sums for HalfWindows {
             let mut carry = S::splat_d(0.0);
             for group in 0..groups {
                 let at = MARGIN + group * GROUP;
-                let sum = S::prefix_sum_d(S::widen(S::load(z.add(at))));
-                let along = S::add_d(sum, carry);
-                carry = S::add_d(S::last_d(sum), carry);
+                let along = S::running_sum_d(S::widen(S::load(z.add(at))), &mut carry);
                 let sum = match self.last {
                     Some(last) => {
                         S::add_d(along, S::load_d(integrals.add(last * frame.stride + at)))
@@ -117,10 +115,9 @@ impl Sums for HalfWindows {
             let mut tangents = [[across.narrow(); 3], [along.narrow(); 3]];
             let [own, above, below] = [y, above, below].map(|y| planes.start(frame, y));
             for c in 0..2 {
-                let point = |row: *const f32, x: usize| row.add(c * frame.stride + x);
-                tangents[0][c] = Floats::load(point(own, next)) - Floats::load(point(own, before));
-                tangents[1][c] =
-                    Floats::load(point(below, x + 1)) - Floats::load(point(above, x - 1));
+                let point = |row: *const f32, x: usize| Floats::load(row.add(c * frame.stride + x));
+                tangents[0][c] = point(own, next) - point(own, before);
+                tangents[1][c] = point(below, x + 1) - point(above, x - 1);
             }
             tangents
         }

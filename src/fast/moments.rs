@@ -40,22 +40,26 @@ impl<T: Copy> Clone for WindowMoments<T> {
 impl<T: Copy> Copy for WindowMoments<T> {}
 
 impl WindowMoments<f64> {
-    /// Of points, about the first of them.
-    pub fn of(points: impl Iterator<Item = [f64; 3]>) -> Self {
-        let mut moments = WindowMoments { sums: [0.0; CHANNELS], share: 0.0 };
-        let (mut origin, mut count) = (None, 0);
-        for point in points {
-            let origin = origin.get_or_insert(point);
-            let [x, y, z] = [0, 1, 2].map(|c| point[c] - origin[c]);
-            let of_point = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
-            for (sum, value) in moments.sums.iter_mut().zip(of_point) {
-                *sum += value;
-            }
-            count += 1;
-        }
-        moments.share = 1.0 / f64::from(count);
-        moments
+    /// Of so many points.
+    fn of(sums: [f64; CHANNELS], count: f64) -> Self {
+        WindowMoments { sums, share: 1.0 / count }
     }
+}
+
+/// The sums of points' moments about the first of them, and the number of points.
+pub(crate) fn sum_of_moments(points: impl Iterator<Item = [f64; 3]>) -> ([f64; CHANNELS], f64) {
+    let (mut sums, mut count) = ([0.0; CHANNELS], 0.0);
+    let mut origin = None;
+    for point in points {
+        let origin = origin.get_or_insert(point);
+        let [x, y, z] = [0, 1, 2].map(|c| point[c] - origin[c]);
+        let of_point = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
+        for (sum, value) in sums.iter_mut().zip(of_point) {
+            *sum += value;
+        }
+        count += 1.0;
+    }
+    (sums, count)
 }
 
 /// Newton steps for the eigenvalue: one or two are usual, a few more where two eigenvalues are near.
@@ -203,14 +207,13 @@ impl Sums for Moments {
         side: usize,
     ) -> Option<Self::Of1> {
         let half = (side / 2) as isize;
-        let mut moments = WindowMoments { sums: [0.0; CHANNELS], share: 0.0 };
-        let mut count = 0;
+        let (mut sums, mut count) = ([0.0; CHANNELS], 0.0);
         for rect in image.rects((x as isize - half, y as isize - half), (side, side)) {
             if rect.x.is_empty() || rect.y.is_empty() {
                 continue;
             }
-            count += rect.x.len() * rect.y.len();
-            for (c, sum) in moments.sums.iter_mut().enumerate() {
+            count += (rect.x.len() * rect.y.len()) as f64;
+            for (c, sum) in sums.iter_mut().enumerate() {
                 let segment = |end_row: usize| {
                     if end_row == 0 {
                         return 0.0;
@@ -223,8 +226,7 @@ impl Sums for Moments {
                 *sum += segment(rect.y.end) - segment(rect.y.start);
             }
         }
-        moments.share = 1.0 / count as f64;
-        Some(moments)
+        Some(WindowMoments::of(sums, count))
     }
 
     #[inline(always)]
@@ -249,7 +251,8 @@ impl Sums for Moments {
         let half = (side / 2) as isize;
         let window = (x as isize - half, y as isize - half);
         let pixels = image.rects(window, (side, side)).flat_map(|rect| rect.pixels());
-        Some(WindowMoments::of(pixels.map(|(x, y)| points.at(x, y).map(f64::from))))
+        let (sums, count) = sum_of_moments(pixels.map(|(x, y)| points.at(x, y).map(f64::from)));
+        Some(WindowMoments::of(sums, count))
     }
 
     #[inline(always)]
@@ -369,9 +372,7 @@ unsafe fn integrate<S: Simd, const FACTORS: usize>(
             if FACTORS == 2 {
                 product = S::mul_d(product, S::load_d(factors[1].add(at)));
             }
-            let sum = S::prefix_sum_d(product);
-            let along = S::add_d(sum, carry);
-            carry = S::add_d(S::last_d(sum), carry);
+            let along = S::running_sum_d(product, &mut carry);
             S::store_d(row.add(plane + at), S::add_d(along, S::load_d(above.add(plane + at))));
         }
     }

@@ -79,7 +79,7 @@ impl Planes {
         self.data.capacity() * size_of::<f32>()
     }
 
-    /// Where row `y`'s planes start: a stride apart.
+    /// Where row `y`'s planes start, a stride apart: for groups here and there, each of which a slice would check.
     #[inline(always)]
     pub fn start(&self, frame: &Frame, y: usize) -> *const f32 {
         self.data.as_ptr().wrapping_add(frame.place(y) * 3 * frame.stride)

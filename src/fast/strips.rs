@@ -108,9 +108,8 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
                     } else {
                         S::add_i(point, S::load_i(pair.as_ptr().add(at)))
                     };
-                    let sum = S::prefix_sum_i(strip);
-                    S::store_i(rows.as_mut_ptr().add(at), S::add_i(sum, carry));
-                    carry = S::add_i(S::last_i(sum), carry);
+                    let sum = S::running_sum_i(strip, &mut carry);
+                    S::store_i(rows.as_mut_ptr().add(at), sum);
                 }
                 let columns = self.columns.as_mut_ptr();
                 for group in 0..groups {

@@ -27,6 +27,7 @@ impl Cloud {
         let (width, height) = (points.width(), points.height());
         (self.width, self.height) = (width, height);
         let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
+        // Row by row: of an iterator over both, the vector would not know how long it is.
         self.points.clear();
         for y in 0..height {
             self.points.extend((0..width).map(|x| cleaned.at(x, y)));

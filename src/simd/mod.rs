@@ -96,6 +96,31 @@ pub(crate) trait Simd: Copy {
     /// f64 to f32.
     unsafe fn narrow(a: Self::D) -> Self::F;
 
+    /// The prefix sums, going on from `carry`, which becomes the last one: it waits for one addition only, not for
+    /// the prefix sums.
+    #[inline(always)]
+    unsafe fn running_sum_i(a: Self::I, carry: &mut Self::I) -> Self::I {
+        // SAFETY: as the caller's.
+        unsafe {
+            let sum = Self::prefix_sum_i(a);
+            let running = Self::add_i(sum, *carry);
+            *carry = Self::add_i(Self::last_i(sum), *carry);
+            running
+        }
+    }
+
+    /// As [`Simd::running_sum_i`].
+    #[inline(always)]
+    unsafe fn running_sum_d(a: Self::D, carry: &mut Self::D) -> Self::D {
+        // SAFETY: as the caller's.
+        unsafe {
+            let sum = Self::prefix_sum_d(a);
+            let running = Self::add_d(sum, *carry);
+            *carry = Self::add_d(Self::last_d(sum), *carry);
+            running
+        }
+    }
+
     /// `mask ? yes : no`
     #[inline(always)]
     unsafe fn select(mask: Self::F, yes: Self::F, no: Self::F) -> Self::F {

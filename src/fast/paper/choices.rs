@@ -1,6 +1,7 @@
 //! Which even window each pixel takes, fast, for one row of blocks: the plain form is in `paper::even_windows`. The
 //! windows at one place of eight blocks are gathered together, and weighed for a pixel of each at a time.
 
+use super::rects::STEPS;
 use crate::fast::arithmetic::Floats;
 use crate::fast::tile::Bits;
 use crate::paper::{
@@ -8,8 +9,6 @@ use crate::paper::{
     inverse_depth,
 };
 use crate::simd::{GROUP, Simd};
-
-use super::rects::STEPS;
 
 /// Finds the choices of the pixels of a row of blocks, which are none so far.
 ///
@@ -49,7 +48,6 @@ struct Group<'a> {
 }
 
 /// Columns or rows of blocks, one for each of eight.
-#[derive(Clone, Copy)]
 struct Lines<S: Simd> {
     /// The number of the first block in the row, or that of the column.
     first: [usize; GROUP],
@@ -223,8 +221,8 @@ impl Group<'_> {
             let levels = S::load(levels.as_ptr());
             let mut radii = Floats::<S>::load(radii.as_ptr());
             let mut level = 0.0;
-            let mut may_take = S::lt(zero.0, levels);
-            if S::bits(may_take) == 0 {
+            let takes_any = S::lt(zero.0, levels);
+            if S::bits(takes_any) == 0 {
                 return;
             }
             // Lanes outside the image stand for the last block of the row.
@@ -233,9 +231,9 @@ impl Group<'_> {
             let column = Floats::<S>(S::min(column.0, last.0));
             let row = Floats::<S>::splat(row as f32);
             let own = [lines::<S>(column, column, 1), lines(row, row, across)];
-            found.add(even.windows, &own[0], &own[1], may_take);
+            found.add(even.windows, &own[0], &own[1], takes_any);
             loop {
-                may_take = S::and(S::lt(zero.0, radii.0), S::lt(S::splat(level), levels));
+                let may_take = S::and(S::lt(zero.0, radii.0), S::lt(S::splat(level), levels));
                 if S::bits(may_take) == 0 {
                     break;
                 }
@@ -304,8 +302,8 @@ impl Group<'_> {
                 let at_pixel = candidates.at_first + across * column + down * row;
                 let off = (near.own - at_pixel).abs();
                 let lies_in = S::lt(off.0, (tolerance + candidates.jitter).0);
-                let is_worse = S::and_not(lies_in, S::lt(zero.0, short.0));
-                let better = S::and_not(is_worse, S::lt(cost.0, least.0));
+                let is_beyond = S::and_not(lies_in, S::lt(zero.0, short.0));
+                let better = S::and_not(is_beyond, S::lt(cost.0, least.0));
                 least.0 = S::select(better, cost.0, least.0);
                 best = S::select(better, S::splat(number as f32), best);
             }

@@ -4,7 +4,7 @@
 use super::integrals::{Channels, Counted};
 use super::rects::Rects;
 use crate::fast::arithmetic::{Doubles, Floats, cross, dot};
-use crate::fast::moments::{WindowMoments, plane};
+use crate::fast::moments::{WindowMoments, plane, sum_of_moments};
 use crate::fast::tile::{Bits, Found};
 use crate::paper::{CleanPoints, ROUNDING, Rect};
 use crate::simd::{GROUP, Simd};
@@ -108,9 +108,7 @@ impl Sums<MOMENTS> for CovarianceMatrix {
 
     #[cold]
     fn afresh(points: &impl CleanPoints, rect: &Rect) -> Option<[f64; MOMENTS]> {
-        let WindowMoments { sums, share } = WindowMoments::of(points.finite(rect));
-        let count = 1.0 / share;
-        let [x, y, z, xx, xy, xz, yy, yz, zz] = sums;
+        let ([x, y, z, xx, xy, xz, yy, yz, zz], count) = sum_of_moments(points.finite(rect));
         Some([x, y, z, count, xx, yy, zz, count, xy, yz, xz, count])
     }
 }

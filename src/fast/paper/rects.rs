@@ -68,6 +68,7 @@ impl Rects {
             let last = row_start::<S>(place, S::sub(S::sub(y[1], edge), one));
             let corners = [(above, left), (above, right), (last, left), (last, right)];
             for (to, (row, column)) in rects.corners.iter_mut().zip(corners) {
+                // Times N: not every instruction set has a product of integers.
                 let element = S::truncate_i(S::add(row, column));
                 let twice = S::add_i(element, element);
                 let four = S::add_i(twice, twice);
