@@ -137,6 +137,27 @@ fn frames_before_do_not_matter() {
     }
 }
 
+/// Threads sweep rows of their own and those around them that reach them, which are more in deeper frames.
+#[test]
+fn a_frame_may_be_deeper_than_the_one_before() {
+    let near = Cloud::new(Kind::NanBlocks, 120, 400, 18);
+    let mut far = Cloud::new(Kind::NanBlocks, 120, 400, 19);
+    for coordinate in far.points.as_flattened_mut() {
+        *coordinate *= 300.0;
+    }
+    for method in methods() {
+        let mut options = options(method, 10.0, true);
+        let expected = compute(&mut Estimator::new(options.clone()), &far);
+        options.threads = 2;
+        let mut estimator = Estimator::new(options);
+        for _ in 0..2 {
+            compute(&mut estimator, &near);
+            let found = compute(&mut estimator, &far);
+            assert_same_bits(&found, &expected, far.width, &format!("{method:?}"));
+        }
+    }
+}
+
 /// The method that needs the most memory.
 const LARGEST_RINGS: (Method, BorderPolicy) = (Method::CovarianceMatrix, BorderPolicy::Ignore);
 

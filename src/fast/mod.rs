@@ -50,6 +50,9 @@ const TILE_ROWS: usize = 256;
 /// much with windows of 5 to 50 pixels.
 const TILE_BYTES: usize = 512 << 10;
 
+/// How much deeper than the frame before a frame may be for its rows to be swept only once.
+const DEEPER: f32 = 1.25;
+
 /// Scratch memory and threads, reused from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
@@ -58,6 +61,8 @@ pub(crate) struct Scratch {
     each: Vec<Mutex<WorkerScratch>>,
     listed: Vec<(u32, u32)>,
     chunks: Vec<Chunk>,
+    /// How far the sweeps of the frame before reached around their rows.
+    last_reach: usize,
     paper: paper::Scratch,
 }
 
@@ -151,20 +156,27 @@ pub(crate) fn compute(
 ) -> Result<(), Error> {
     scratch.prepare(options.threads)?;
     let (width, height) = (points.width(), points.height());
-    let Scratch { workers, rows, each, listed, chunks, .. } = scratch;
+    let Scratch { workers, rows, each, listed, chunks, last_reach, .. } = scratch;
     let count = workers.count();
 
     let image = Image { width, height, border_policy: options.border_policy };
     let whole_points = points.has_whole_points(normals);
     let job = Job { isa, points, options, image, whole_points };
 
-    // One sweep over all rows needs no bound on its reach.
-    let reach = if count > 1 { job.reach(job.deepest(workers)) } else { height };
-    share_out(height, count, reach, chunks);
-    let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
     let length = row_length(width);
-    reserve(rows, swept * length, Lanes::ZERO)?;
-    let limit = job.sweep(workers, each, chunks, &mut rows[..swept * length]);
+    let mut reach = job.reach(0.0).max(*last_reach);
+    let (limit, swept) = loop {
+        share_out(height, count, reach, chunks);
+        let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
+        reserve(rows, swept * length, Lanes::ZERO)?;
+        let limit = job.sweep(workers, each, chunks, &mut rows[..swept * length]);
+        if chunks.len() == 1 || job.reach(limit) <= reach {
+            break (limit, swept);
+        }
+        // Depths reach farther than in the frame before.
+        reach = job.reach(DEEPER * limit);
+    };
+    *last_reach = reach.min(job.reach(DEEPER * limit));
 
     let reach = job.reach(limit);
     let rows = &rows[..swept * length];
@@ -240,18 +252,6 @@ impl Job<'_> {
     fn reach(&self, deepest: f32) -> usize {
         let smoothing = depth_smoothing(deepest, self.options);
         (smoothing as usize).saturating_add(2).min(self.image.width + self.image.height)
-    }
-
-    /// The largest finite magnitude of the depths.
-    fn deepest(&self, workers: &Workers) -> f32 {
-        let deepest = AtomicU32::new(0);
-        workers.for_each(self.image.height, |_, y| {
-            let depths = (0..self.image.width).map(|x| self.points.z(x, y).abs());
-            let largest = depths.filter(|z| z.is_finite()).fold(0.0, f32::max);
-            // Positive floats are in the order of their bits.
-            deepest.fetch_max(largest.to_bits(), Ordering::Relaxed);
-        });
-        f32::from_bits(deepest.into_inner())
     }
 
     // Not inlined, as the next one: profiles and the test of instruction counts tell the two by name.

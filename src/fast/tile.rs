@@ -186,8 +186,9 @@ impl Tile<'_> {
                 unsafe { sums.push::<S>(frame, planes, next) };
                 next += 1;
             }
+            let inner = self.inner(side, y);
             // SAFETY: as the caller's.
-            unsafe { self.row::<S, M>(frame, planes, sums, sides, sink, y, hidden) };
+            unsafe { self.row::<S, M>(frame, planes, sums, sides, sink, y, &inner, hidden) };
         }
         Ok(())
     }
@@ -242,6 +243,7 @@ impl Tile<'_> {
         sides: &impl Fn(usize) -> &'r [f32],
         sink: &Sink,
         y: usize,
+        inner: &Range<usize>,
         hidden: bool,
     ) {
         let row = sides(y);
@@ -251,7 +253,10 @@ impl Tile<'_> {
         while x < self.columns.end {
             // SAFETY: as the caller's; a row of sides is readable up to a whole pair of groups.
             unsafe {
-                let pair = [Group::<S>::new(self, row, x, y), Group::new(self, row, x + GROUP, y)];
+                let pair = [
+                    Group::<S>::new(self, row, x, y, inner),
+                    Group::new(self, row, x + GROUP, y, inner),
+                ];
                 x += 2 * GROUP;
                 let windows = pair[0].windows | pair[1].windows << GROUP;
                 if windows == 0 || hidden {
@@ -406,9 +411,22 @@ impl Tile<'_> {
         }
     }
 
+    /// Where a group of row `y` may start, for windows of up to `side` to be inside the image whatever they are.
+    fn inner(&self, side: usize, y: usize) -> Range<usize> {
+        let Image { width, height, .. } = *self.image;
+        let (half, rest) = (side / 2, side / 2 + 1);
+        if y <= half || y + rest >= height {
+            return 0..0;
+        }
+        half + 1..width.saturating_sub(rest + GROUP - 1)
+    }
+
     /// Whether the windows of some lanes, and the pixels around them, are inside the image.
     #[inline(always)]
     fn is_inside<S: Simd>(&self, group: &Group<S>, lanes: u32, side: usize) -> bool {
+        if group.inner {
+            return true;
+        }
         let Image { width, height, .. } = *self.image;
         let first = lanes.trailing_zeros() as usize;
         let last = (u32::BITS - 1 - lanes.leading_zeros()) as usize;
@@ -491,19 +509,21 @@ struct Group<'a, S: Simd> {
     count: usize,
     /// The lanes that have a window.
     windows: u32,
+    /// Whether windows of any of the tile's sides are inside the image here.
+    inner: bool,
 }
 
 impl<'a, S: Simd> Group<'a, S> {
     /// # Safety
     /// The processor has the instruction set of `S`; the row is readable from `x` up to a whole group.
     #[inline(always)]
-    unsafe fn new(tile: &Tile, row: &'a [f32], x: usize, y: usize) -> Self {
+    unsafe fn new(tile: &Tile, row: &'a [f32], x: usize, y: usize, inner: &Range<usize>) -> Self {
         let count = tile.columns.end.saturating_sub(x).min(GROUP);
         // SAFETY: as the caller's.
         unsafe {
             let sides = S::load(row.as_ptr().add(x));
             let windows = S::bits(S::lt(S::splat(0.0), sides)) & ((1 << count) - 1);
-            Group { x, y, row, sides, count, windows }
+            Group { x, y, row, sides, count, windows, inner: inner.contains(&x) }
         }
     }
 
