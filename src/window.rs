@@ -46,14 +46,10 @@ impl Image {
         start: (isize, isize),
         size: (usize, usize),
     ) -> impl Iterator<Item = Rect> + Clone + use<> {
-        let columns = fold(start.0, size.0, self.width, self.border_policy);
-        let rows = fold(start.1, size.1, self.height, self.border_policy);
-        rows.into_iter().flat_map(move |y| {
-            columns.clone().into_iter().map(move |x| {
-                let ((x, sign_x), (y, sign_y)) = (in_order(x), in_order(y.clone()));
-                Rect { x, y, sign: sign_x * sign_y }
-            })
-        })
+        let [left, right] = &fold(start.0, size.0, self.width, self.border_policy).map(in_order);
+        let [upper, lower] = &fold(start.1, size.1, self.height, self.border_policy).map(in_order);
+        let all = [(left, upper), (right, upper), (left, lower), (right, lower)];
+        all.map(|(x, y)| Rect { x: x.0.clone(), y: y.0.clone(), sign: x.1 * y.1 }).into_iter()
     }
 
     /// A pixel that may lie outside the image, brought back inside: mirrored as PCL does, or clamped.

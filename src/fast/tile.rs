@@ -392,8 +392,8 @@ impl Tile<'_> {
                 sums.of_group::<S>(frame, planes, group.x, group.y, side)
             } else {
                 let mut of8 = M::none::<S>();
-                plain |=
-                    self.crossing::<S, M>(frame, planes, sums, sides, group, same, side, &mut of8);
+                plain |= self
+                    .put_crossing::<S, M>(frame, planes, sums, sides, group, same, side, &mut of8);
                 of8
             };
             while todo != 0 {
@@ -403,8 +403,9 @@ impl Tile<'_> {
                     let these = sums.of_group::<S>(frame, planes, group.x, group.y, side);
                     of8 = M::select::<S>(same, these, of8);
                 } else {
-                    plain |= self
-                        .crossing::<S, M>(frame, planes, sums, sides, group, same, side, &mut of8);
+                    plain |= self.put_crossing::<S, M>(
+                        frame, planes, sums, sides, group, same, side, &mut of8,
+                    );
                 }
             }
             (of8, plain)
@@ -442,9 +443,9 @@ impl Tile<'_> {
     ///
     /// # Safety
     /// As [`Tile::compute`].
-    #[cold]
+    #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    unsafe fn crossing<'r, S: Simd, M: Sums>(
+    unsafe fn put_crossing<'r, S: Simd, M: Sums>(
         &self,
         frame: &Frame,
         planes: &Planes,
@@ -455,21 +456,41 @@ impl Tile<'_> {
         side: usize,
         of8: &mut M::Of8<S>,
     ) -> u32 {
-        let mut plain = 0;
-        for lane in Bits(lanes) {
-            let pixel = (group.x + lane, group.y);
-            let one = if self.has_only_finite(pixel, side, sides) {
-                sums.of_mirrored(frame, planes, self.image, pixel, side)
-            } else {
-                None
-            };
-            match one {
+        let pixel = (group.x, group.y);
+        let ones = self.crossing(frame, planes, sums, sides, pixel, lanes, side);
+        let mut plain = lanes;
+        for (lane, one) in ones.into_iter().enumerate() {
+            if let Some(one) = one {
                 // SAFETY: as the caller's.
-                Some(one) => unsafe { M::put::<S>(of8, lane, one) },
-                None => plain |= 1 << lane,
+                unsafe { M::put::<S>(of8, lane, one) };
+                plain &= !(1 << lane);
             }
         }
         plain
+    }
+
+    /// The sums of windows that cross the border of the image, but of those that are left to the plain form. `pixel`
+    /// is the group's first one.
+    // No instructions of `S` in here: they would not be inlined into a function of its own.
+    #[cold]
+    #[allow(clippy::too_many_arguments)]
+    fn crossing<'r, M: Sums>(
+        &self,
+        frame: &Frame,
+        planes: &Planes,
+        sums: &M,
+        sides: &impl Fn(usize) -> &'r [f32],
+        pixel: (usize, usize),
+        lanes: u32,
+        side: usize,
+    ) -> [Option<M::Of1>; GROUP] {
+        std::array::from_fn(|lane| {
+            let pixel = (pixel.0 + lane, pixel.1);
+            if lanes >> lane & 1 == 0 || !self.has_only_finite(pixel, side, sides) {
+                return None;
+            }
+            sums.of_mirrored(frame, planes, self.image, pixel, side)
+        })
     }
 
     /// Whether a mirrored window certainly holds finite points only.
