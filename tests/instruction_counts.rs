@@ -27,12 +27,12 @@ use Semantics::{Paper, Pcl};
 
 /// Instructions a pixel at most: with AVX2, with SSE2. The paper has no border policies.
 const BOUNDS: [(Semantics, Method, BorderPolicy, u64, u64); 10] = [
-    (Pcl, CovarianceMatrix, Ignore, 229, 483),
-    (Pcl, CovarianceMatrix, Mirror, 372, 570),
-    (Pcl, Average3DGradient, Ignore, 117, 193),
-    (Pcl, Average3DGradient, Mirror, 190, 252),
-    (Pcl, AverageDepthChange, Ignore, 135, 209),
-    (Pcl, AverageDepthChange, Mirror, 289, 343),
+    (Pcl, CovarianceMatrix, Ignore, 221, 448),
+    (Pcl, CovarianceMatrix, Mirror, 285, 526),
+    (Pcl, Average3DGradient, Ignore, 115, 193),
+    (Pcl, Average3DGradient, Mirror, 157, 241),
+    (Pcl, AverageDepthChange, Ignore, 132, 209),
+    (Pcl, AverageDepthChange, Mirror, 224, 311),
     (Pcl, Simple3DGradient, Ignore, 113, 186),
     (Paper, CovarianceMatrix, Ignore, 271, 486),
     (Paper, Average3DGradient, Ignore, 235, 348),

@@ -44,7 +44,7 @@ use crate::window::Image;
 pub(crate) const SIZES: RangeInclusive<usize> = 3..=1 << 24;
 
 /// Rows of a tile: those around it that its windows reach are read again for the next one.
-const TILE_ROWS: usize = 256;
+const TILE_ROWS: usize = 128;
 
 /// Bytes of a tile's rings, to stay in or near the second-level cache. Found, as the rows, by trying half and twice as
 /// much with windows of 5 to 50 pixels.

@@ -22,7 +22,7 @@ use windows::{Rows, Sweep, reach};
 
 use super::paths::{self, Task};
 use super::sink::Sink;
-use super::{Chunk, Parts, TILE_ROWS, lock, read_map, reserve, share_out};
+use super::{Chunk, Parts, lock, read_map, reserve, share_out};
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
@@ -32,6 +32,9 @@ use crate::simd::{GROUP, Simd};
 
 /// Elements of a tile's rings at most: floats hold their indices. Room for the largest windows there are.
 const MOST_INDICES: usize = 1 << 24;
+
+/// Rows of a tile: windows reach farther than PCL's, and more rows around it are summed again for the next one.
+const TILE_ROWS: usize = 256;
 
 /// Bytes of a tile's rings. Eight windows' corners move along them from group to group, which needs no more than a few
 /// of the rows' cache lines at a time: narrow tiles cost more, in pixels around them that are summed twice.
