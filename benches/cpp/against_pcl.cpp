@@ -483,6 +483,23 @@ printThreads ()
                "other programs run.\n\n", possible, scaling ());
 }
 
+// The pixels that get a normal. Those at the border do not, which are more of a small image and of large windows.
+double
+countNormals (Estimator& estimator, const Cloud& cloud, Normals& normals)
+{
+  estimator.compute (cloud, normals);
+  return static_cast<double> (std::count_if (normals.begin (), normals.end (), [] (const pcl::Normal& normal) {
+    return std::isfinite (normal.normal_x);
+  }));
+}
+
+double
+largestOverSmallest (const std::vector<double>& values)
+{
+  const auto ends = std::minmax_element (values.begin (), values.end ());
+  return *ends.second / *ends.first;
+}
+
 void
 printSizes ()
 {
@@ -490,9 +507,9 @@ printSizes ()
   std::printf ("### Cost by image size: ns a pixel (generated cloud, smoothing 10, IGNORE, C API)\n\n| method ");
   for (const auto& size : sizes)
     std::printf ("| %ux%u ", size[0], size[1]);
-  std::printf ("| largest / smallest (asked: 1.15) |\n|---|---|---|---|---|---|---|\n");
+  std::printf ("| largest / smallest (asked: 1.15) | the same, ns a normal |\n|---|---|---|---|---|---|---|---|\n");
   // One size at a time, all methods: the largest clouds are half a gigabyte.
-  std::vector<std::vector<double>> cost (5), bytes (4);
+  std::vector<std::vector<double>> cost (5), cost_of_normal (5), bytes (4);
   for (const auto& size : sizes)
   {
     const Cloud::Ptr cloud = generated (size[0], size[1]);
@@ -512,15 +529,18 @@ printSizes ()
     for (std::size_t k = 0; k < t.size (); ++k)
       cost[k].push_back (t[k] * 1e6 / pixels);
     for (std::size_t k = 0; k < estimators.size (); ++k)
+    {
       bytes[k].push_back (static_cast<double> (estimators[k]->scratch ()) / pixels);
+      cost_of_normal[k + 1].push_back (t[k + 1] * 1e6 / countNormals (*estimators[k], *cloud, normals));
+    }
   }
   for (std::size_t k = 0; k < cost.size (); ++k)
   {
     std::printf ("| %s ", k == 0 ? "memcpy" : METHODS[k - 1].name);
     for (const double value : cost[k])
       std::printf ("| %.2f ", value);
-    std::printf ("| %.2f |\n", *std::max_element (cost[k].begin (), cost[k].end ()) /
-                                   *std::min_element (cost[k].begin (), cost[k].end ()));
+    std::printf ("| %.2f | %s |\n", largestOverSmallest (cost[k]),
+                 k == 0 ? "-" : number (largestOverSmallest (cost_of_normal[k]), "%.2f").c_str ());
   }
   std::printf ("\n### Scratch memory: bytes a pixel (asked: 8, and a few dozen rows)\n\n| method ");
   for (const auto& size : sizes)
@@ -545,7 +565,7 @@ printSmoothingSizes (const std::vector<Frame>& frames)
     std::printf ("### Cost by smoothing size: ns a pixel (%s, IGNORE, C API)\n\n| method ", frame.name.c_str ());
     for (const float size : sizes)
       std::printf ("| %g ", size);
-    std::printf ("| largest / smallest (asked: 1.15) |\n|---|---|---|---|---|---|---|---|\n");
+    std::printf ("| largest / smallest (asked: 1.15) | the same, ns a normal |\n|---|---|---|---|---|---|---|---|---|\n");
     Normals normals (frame.cloud->width, frame.cloud->height);
     for (const Method& method : METHODS)
     {
@@ -559,9 +579,13 @@ printSmoothingSizes (const std::vector<Frame>& frames)
       }
       const auto t = alternate (21, works);
       std::printf ("| %s ", method.name);
-      for (const double time : t)
-        std::printf ("| %.2f ", time * 1e6 / static_cast<double> (frame.cloud->size ()));
-      std::printf ("| %.2f |\n", *std::max_element (t.begin (), t.end ()) / *std::min_element (t.begin (), t.end ()));
+      std::vector<double> cost_of_normal;
+      for (std::size_t k = 0; k < t.size (); ++k)
+      {
+        std::printf ("| %.2f ", t[k] * 1e6 / static_cast<double> (frame.cloud->size ()));
+        cost_of_normal.push_back (t[k] / countNormals (*estimators[k], *frame.cloud, normals));
+      }
+      std::printf ("| %.2f | %.2f |\n", largestOverSmallest (t), largestOverSmallest (cost_of_normal));
     }
     std::printf ("\n");
   }

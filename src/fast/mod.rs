@@ -46,9 +46,9 @@ pub(crate) const SIZES: RangeInclusive<usize> = 3..=1 << 24;
 /// Rows of a tile: those around it that its windows reach are read again for the next one.
 const TILE_ROWS: usize = 128;
 
-/// Bytes of a tile's rings, to stay in or near the second-level cache. Found, as the rows, by trying half and twice as
-/// much with windows of 5 to 50 pixels.
-const TILE_BYTES: usize = 512 << 10;
+/// Bytes of a tile's rings, to stay near the second-level cache without narrow tiles, the columns around which are
+/// summed again. Found, as the rows, by trying half and twice as much with windows of 5 to 50 pixels.
+const TILE_BYTES: usize = 1 << 20;
 
 /// How much deeper than the frame before a frame may be for its rows to be swept only once.
 const DEEPER: f32 = 1.25;
