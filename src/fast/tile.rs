@@ -1,7 +1,7 @@
 //! Steps 4 and 5, fast, for one tile of the image: rows of points go through rings of sums, and every group of
 //! eight pixels takes its windows' sums from them.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use super::arithmetic::{Floats, dot};
 use super::planes::{Frame, MARGIN, Planes};
@@ -412,14 +412,14 @@ impl Tile<'_> {
         }
     }
 
-    /// Where a group of row `y` may start, for windows of up to `side` to be inside the image whatever they are.
+    /// The columns of row `y` around whose pixels windows of up to `side`, and the pixels around them, are inside the
+    /// image.
+    #[inline(always)]
     fn inner(&self, side: usize, y: usize) -> Range<usize> {
         let Image { width, height, .. } = *self.image;
+        // AVERAGE_DEPTH_CHANGE reaches one pixel further than the window.
         let (half, rest) = (side / 2, side / 2 + 1);
-        if y <= half || y + rest >= height {
-            return 0..0;
-        }
-        half + 1..width.saturating_sub(rest + GROUP - 1)
+        if y > half && y + rest < height { half + 1..width.saturating_sub(rest) } else { 0..0 }
     }
 
     /// Whether the windows of some lanes, and the pixels around them, are inside the image.
@@ -428,15 +428,9 @@ impl Tile<'_> {
         if group.inner {
             return true;
         }
-        let Image { width, height, .. } = *self.image;
         let first = lanes.trailing_zeros() as usize;
         let last = (u32::BITS - 1 - lanes.leading_zeros()) as usize;
-        // AVERAGE_DEPTH_CHANGE reaches one pixel further than the window.
-        let (half, rest) = (side / 2, side / 2 + 1);
-        group.x + first > half
-            && group.x + last + rest < width
-            && group.y > half
-            && group.y + rest < height
+        contains(&self.inner(side, group.y), group.x + first..=group.x + last)
     }
 
     /// Puts the sums of windows that cross the border of the image; returns the lanes left to the plain form.
@@ -518,6 +512,12 @@ fn halves(range: &Range<usize>) -> (Range<usize>, Range<usize>) {
     (range.start..middle, middle..range.end)
 }
 
+/// Whether a range has all of another, which is not empty.
+#[inline(always)]
+fn contains(range: &Range<usize>, other: RangeInclusive<usize>) -> bool {
+    range.start <= *other.start() && *other.end() < range.end
+}
+
 /// Eight pixels of a row and their windows.
 struct Group<'a, S: Simd> {
     /// The first pixel.
@@ -544,7 +544,8 @@ impl<'a, S: Simd> Group<'a, S> {
         unsafe {
             let sides = S::load(row.as_ptr().add(x));
             let windows = S::bits(S::lt(S::splat(0.0), sides)) & ((1 << count) - 1);
-            Group { x, y, row, sides, count, windows, inner: inner.contains(&x) }
+            let inner = contains(inner, x..=x + GROUP - 1);
+            Group { x, y, row, sides, count, windows, inner }
         }
     }
 
