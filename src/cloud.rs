@@ -8,6 +8,7 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 use crate::Error;
+use crate::simd::{GROUP, Simd};
 
 /// The geometry that all fields of a view share. Strides are in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -285,7 +286,7 @@ impl<'a> Points<'a> {
     }
 
     /// Whether the 16 bytes from a point's x are part of the same cloud, and of nothing that `normals` writes, for
-    /// every point but the last: then points can be read whole.
+    /// every point but a row's last: then points can be read whole.
     pub(crate) fn has_whole_points(&self, normals: &Normals) -> bool {
         let interleaved = self.y == self.x.wrapping_add(1) && self.z == self.x.wrapping_add(2);
         let apart = |(field, grid): &(*const f32, Grid)| {
@@ -293,83 +294,69 @@ impl<'a> Points<'a> {
             end <= field.addr() || field.addr() + grid.extent() <= start
         };
         interleaved
-            && self.grid.point_stride >= 4 * FIELD
+            && self.grid.point_stride >= 3 * FIELD
             && normals.fields().iter().flatten().all(apart)
     }
 
-    /// Copies points from byte `first` of a row, four at a time and not the last one; returns how many.
-    #[cfg(target_arch = "x86_64")]
+    /// The points of row `y` in `columns`. `whole_points` as [`Points::has_whole_points`] says.
     #[inline(always)]
-    fn read_whole_points(
-        &self,
-        first: usize,
-        count: usize,
-        stride: usize,
-        to: &mut [f32],
-    ) -> usize {
-        use std::arch::x86_64::*;
-        let step = self.grid.point_stride;
-        let mut done = 0;
-        while done + 4 < count {
-            // SAFETY: four points that are not the last one lie inside the row, and four floats of each plane inside
-            // `to`, as the caller checked; SSE is part of every x86-64.
-            unsafe {
-                let from = self.x.byte_add(first + done * step);
-                let (a, b) = (_mm_loadu_ps(from), _mm_loadu_ps(from.byte_add(step)));
-                let c = _mm_loadu_ps(from.byte_add(2 * step));
-                let d = _mm_loadu_ps(from.byte_add(3 * step));
-                let (ab_xy, cd_xy) = (_mm_unpacklo_ps(a, b), _mm_unpacklo_ps(c, d));
-                let (ab_zw, cd_zw) = (_mm_unpackhi_ps(a, b), _mm_unpackhi_ps(c, d));
-                let to = to.as_mut_ptr().add(done);
-                _mm_storeu_ps(to, _mm_movelh_ps(ab_xy, cd_xy));
-                _mm_storeu_ps(to.add(stride), _mm_movehl_ps(cd_xy, ab_xy));
-                _mm_storeu_ps(to.add(2 * stride), _mm_movelh_ps(ab_zw, cd_zw));
-            }
-            done += 4;
-        }
-        done
-    }
-
-    /// Other processors read every point coordinate by coordinate.
-    #[cfg(not(target_arch = "x86_64"))]
-    #[inline(always)]
-    fn read_whole_points(
-        &self,
-        _first: usize,
-        _count: usize,
-        _stride: usize,
-        _to: &mut [f32],
-    ) -> usize {
-        0
-    }
-
-    /// Copies the points of row `y` in `columns` to three planes, `stride` floats apart in `to`; and zeros after
-    /// them up to a multiple of 8 and 8 more. `whole_points` as [`Points::has_whole_points`] says.
-    #[inline(always)]
-    pub(crate) fn read_row(
-        &self,
-        y: usize,
-        columns: Range<usize>,
-        stride: usize,
-        to: &mut [f32],
-        whole_points: bool,
-    ) {
-        let count = columns.len();
+    pub(crate) fn row(&self, y: usize, columns: Range<usize>, whole_points: bool) -> PointRow<'_> {
         assert!(y < self.grid.height && columns.end <= self.grid.width);
-        assert!(to.len() >= 2 * stride + count.next_multiple_of(8) + 8);
-        let first = self.grid.offset(columns.start, y);
+        let offset = self.grid.offset(columns.start, y);
         let step = self.grid.point_stride;
-        let done = if whole_points { self.read_whole_points(first, count, stride, to) } else { 0 };
-        for at in done..count {
-            let offset = first + at * step;
-            for (c, field) in [self.x, self.y, self.z].into_iter().enumerate() {
-                // SAFETY: the point is inside the grid that the constructor vouched for.
-                to[c * stride + at] = unsafe { field.byte_add(offset).read() };
+        let inside = columns.end.min(self.grid.width - 1).saturating_sub(columns.start);
+        let whole = if whole_points { inside } else { 0 };
+        PointRow { points: self, y, first: self.x.wrapping_byte_add(offset), step, whole, columns }
+    }
+}
+
+/// Points of a row, to be read eight at a time.
+pub(crate) struct PointRow<'a> {
+    points: &'a Points<'a>,
+    y: usize,
+    columns: Range<usize>,
+    /// The first point's x, and the bytes to the next one's.
+    first: *const f32,
+    step: usize,
+    /// How many of them can be read whole.
+    whole: usize,
+}
+
+impl PointRow<'_> {
+    /// x, y and z of eight points from the `at`-th on; zeros for those behind the last.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn group<S: Simd>(&self, at: usize) -> [S::F; 3] {
+        // SAFETY: as the caller's; the points that are read whole are inside the row, and not its last.
+        unsafe {
+            if at + GROUP <= self.whole {
+                let low = self.first.byte_add(at * self.step);
+                let high = low.byte_add(4 * self.step);
+                let [x, y, z, _] = S::transpose_halves([
+                    S::load_halves(low, high),
+                    S::load_halves(low.byte_add(self.step), high.byte_add(self.step)),
+                    S::load_halves(low.byte_add(2 * self.step), high.byte_add(2 * self.step)),
+                    S::load_halves(low.byte_add(3 * self.step), high.byte_add(3 * self.step)),
+                ]);
+                return [x, y, z];
+            }
+            let [x, y, z] = self.gather(at);
+            [S::load(x.as_ptr()), S::load(y.as_ptr()), S::load(z.as_ptr())]
+        }
+    }
+
+    /// [`PointRow::group`], coordinate by coordinate.
+    fn gather(&self, at: usize) -> [[f32; GROUP]; 3] {
+        let mut planes = [[0.0; GROUP]; 3];
+        for (lane, x) in self.columns.clone().skip(at).take(GROUP).enumerate() {
+            let point = self.points.at(x, self.y);
+            for c in 0..3 {
+                planes[c][lane] = point[c];
             }
         }
-        for plane in to.chunks_mut(stride).take(3) {
-            plane[count..count.next_multiple_of(8) + 8].fill(0.0);
-        }
+        planes
     }
 }
 

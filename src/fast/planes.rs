@@ -113,17 +113,18 @@ impl Planes {
     ) -> RowNews {
         let start = frame.place(y) * 3 * frame.stride;
         let row = &mut self.data[start..start + 3 * frame.stride];
+        assert!(MARGIN + (frame.groups() + 1) * GROUP <= frame.stride);
         points.prefetch(y + 2, frame.columns.clone());
-        points.read_row(y, frame.columns.clone(), frame.stride, &mut row[MARGIN..], whole_points);
+        let points = points.row(y, frame.columns.clone(), whole_points);
         let xs = row[MARGIN..].as_mut_ptr();
-        // SAFETY: as the caller's; the groups lie inside the planes.
+        // SAFETY: as the caller's; the groups, and one of zeros behind them, lie inside the planes.
         unsafe {
             let (ys, zs) = (xs.add(frame.stride), xs.add(2 * frame.stride));
             let mut hidden = S::splat(0.0);
             let mut largest = S::splat(0.0);
-            for group in 0..frame.groups() {
+            for group in 0..frame.groups() + 1 {
                 let at = group * GROUP;
-                let (x, y, z) = (S::load(xs.add(at)), S::load(ys.add(at)), S::load(zs.add(at)));
+                let [x, y, z] = points.group::<S>(at);
                 let finite_z = S::finite(z);
                 let finite = S::and(finite_z, S::and(S::finite(x), S::finite(y)));
                 hidden = S::or(hidden, S::and_not(finite, finite_z));

@@ -9,7 +9,7 @@ pub(crate) fn row_length(width: usize) -> usize {
     width.next_multiple_of(GROUP) + GROUP
 }
 
-/// Fills a row of depths; `planes` is room for a row of points.
+/// Fills a row of depths.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
@@ -19,21 +19,18 @@ pub(crate) unsafe fn read<S: Simd>(
     options: &Options,
     y: usize,
     whole_points: bool,
-    planes: &mut Vec<f32>,
     depths: &mut [f32],
 ) {
-    let (width, stride) = (points.width(), row_length(points.width()));
-    planes.resize(3 * stride, 0.0);
-    points.read_row(y, 0..width, stride, planes, whole_points);
+    let width = points.width();
     let range = options.paper.depth == Depth::Range;
-    let depths = &mut depths[..stride];
-    // SAFETY: as the caller's; the groups lie inside the planes and the depths.
+    let depths = &mut depths[..row_length(width)];
+    let points = points.row(y, 0..width, whole_points);
+    // SAFETY: as the caller's; the groups lie inside the depths.
     unsafe {
         let none = S::splat(f32::NAN);
         let zero = S::splat(0.0);
-        for x in (0..stride - GROUP).step_by(GROUP) {
-            let plane = |c: usize| planes.as_ptr().add(c * stride + x);
-            let (px, py, pz) = (S::load(plane(0)), S::load(plane(1)), S::load(plane(2)));
+        for x in (0..width).step_by(GROUP) {
+            let [px, py, pz] = points.group::<S>(x);
             let mut there = S::and(S::and(S::finite(px), S::finite(py)), S::finite(pz));
             if options.zero_is_missing {
                 let origin = S::and(S::and(S::eq(px, zero), S::eq(py, zero)), S::eq(pz, zero));

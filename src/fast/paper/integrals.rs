@@ -27,16 +27,13 @@ pub(crate) struct Rings<const N: usize> {
     columns: Range<usize>,
     /// Rows in a ring.
     pub rows: usize,
-    /// The row of points read last, coordinate by coordinate.
-    planes: Vec<f32>,
     /// The largest magnitude of a coordinate read so far.
     pub largest: f32,
 }
 
 impl<const N: usize> Default for Rings<N> {
     fn default() -> Self {
-        let (sums, points, planes) = (Vec::new(), Vec::new(), Vec::new());
-        Rings { sums, points, columns: 0..0, rows: 0, planes, largest: 0.0 }
+        Rings { sums: Vec::new(), points: Vec::new(), columns: 0..0, rows: 0, largest: 0.0 }
     }
 }
 
@@ -57,9 +54,7 @@ impl<const N: usize> Rings<N> {
 
     /// Bytes held.
     pub fn size(&self) -> usize {
-        self.sums.capacity() * size_of::<[f64; N]>()
-            + self.points.capacity() * size_of::<Counted>()
-            + self.planes.capacity() * size_of::<f32>()
+        self.sums.capacity() * size_of::<[f64; N]>() + self.points.capacity() * size_of::<Counted>()
     }
 
     /// Starts over at row `top`, with rings of so many rows.
@@ -124,20 +119,18 @@ impl<const N: usize> Rings<N> {
         let count = self.columns.len();
         let length = count.next_multiple_of(GROUP);
         assert!(self.columns.start + length <= depths.len());
-        grow(&mut self.planes, 3 * (length + GROUP));
-        let stride = length + GROUP;
-        points.read_row(y, self.columns.clone(), stride, &mut self.planes, whole_points);
+        let points = points.row(y, self.columns.clone(), whole_points);
         let to = &mut self.points[row][1..];
-        // SAFETY: as the caller's; the planes, the depths and the row have room for whole groups.
+        // SAFETY: as the caller's; the depths and the row have room for whole groups.
         unsafe {
             let mut largest = S::splat(self.largest);
             for x in (0..length).step_by(GROUP) {
                 let depths = S::load(depths.as_ptr().add(self.columns.start + x));
                 let there = S::eq(depths, depths);
+                let point = points.group::<S>(x);
                 let mut fields = [[0.0; GROUP]; 4];
                 for c in 0..3 {
-                    let field = S::load(self.planes.as_ptr().add(c * stride + x));
-                    let field = S::and(there, field);
+                    let field = S::and(there, point[c]);
                     largest = S::max(S::abs(field), largest);
                     S::store(fields[c].as_mut_ptr(), field);
                 }

@@ -57,7 +57,6 @@ impl Scratch {
 /// What one worker needs.
 #[derive(Debug, Default)]
 pub(crate) struct WorkerScratch {
-    planes: Vec<f32>,
     sweep: Sweep,
     moments: Rings<MOMENTS>,
     gradients: Rings<8>,
@@ -67,11 +66,7 @@ pub(crate) struct WorkerScratch {
 impl WorkerScratch {
     /// Bytes held.
     pub fn size(&self) -> usize {
-        self.planes.capacity() * size_of::<f32>()
-            + self.sweep.size()
-            + self.moments.size()
-            + self.gradients.size()
-            + self.depth_changes.size()
+        self.sweep.size() + self.moments.size() + self.gradients.size() + self.depth_changes.size()
     }
 }
 
@@ -230,15 +225,14 @@ impl<'a> Job<'a> {
     fn depths(&self, scratch: &mut super::Scratch) -> Result<(), Error> {
         let &Job { points, options, whole_points, .. } = self;
         scratch.prepare(options.threads)?;
-        let super::Scratch { workers, each, paper, .. } = scratch;
+        let super::Scratch { workers, paper, .. } = scratch;
         let length = row_length(points.width());
         reserve(&mut paper.depths, length * points.height(), 0.0)?;
         let parts = Parts(paper.depths.as_mut_ptr());
-        workers.for_each(points.height(), |worker, y| {
-            let scratch = &mut lock(&each[worker]).paper;
+        workers.for_each(points.height(), |_, y| {
             // SAFETY: rows do not overlap.
             let depths = unsafe { parts.part(y * length..(y + 1) * length) };
-            let task = DepthsTask { points, options, y, whole_points, scratch, depths };
+            let task = DepthsTask { points, options, y, whole_points, depths };
             // SAFETY: the processor has the instruction set.
             unsafe { paths::run(self.isa, task) };
         });
@@ -349,7 +343,6 @@ struct DepthsTask<'a> {
     options: &'a Options,
     y: usize,
     whole_points: bool,
-    scratch: &'a mut WorkerScratch,
     depths: &'a mut [f32],
 }
 
@@ -358,9 +351,9 @@ impl Task for DepthsTask<'_> {
 
     #[inline(always)]
     unsafe fn run<S: Simd>(self) {
-        let DepthsTask { points, options, y, whole_points, scratch, depths } = self;
+        let DepthsTask { points, options, y, whole_points, depths } = self;
         // SAFETY: as the caller's.
-        unsafe { depths::read::<S>(points, options, y, whole_points, &mut scratch.planes, depths) };
+        unsafe { depths::read::<S>(points, options, y, whole_points, depths) };
     }
 }
 
