@@ -12,6 +12,8 @@ use crate::window::Image;
 pub(crate) struct HalfWindows {
     integrals: Vec<f64>,
     last: Option<usize>,
+    /// By the side of a window.
+    places: Vec<Places>,
 }
 
 /// Horizontal and vertical tangent.
@@ -20,28 +22,57 @@ type Tangents<T> = [[T; 3]; 2];
 /// A normal is doubtful where floats could turn it by more than 1e-4: (sine of the angle between the tangents) < 1e-3.
 const DOUBT_SINE: f32 = 1e-6;
 
-impl HalfWindows {
-    /// The sum of z over the rows after the first up to the second, and `count` columns from `start` on.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`; the ring holds the rows, and columns with the one before.
-    #[inline(always)]
-    unsafe fn rows_between<S: Simd>(
-        &self,
-        frame: &Frame,
-        rows: [usize; 2],
-        start: usize,
-        count: usize,
-    ) -> Doubles<S> {
-        // SAFETY: as the caller's.
-        unsafe {
-            let upper =
-                self.integrals.as_ptr().add(frame.place(rows[0]) * frame.stride + start - 1);
-            let lower =
-                self.integrals.as_ptr().add(frame.place(rows[1]) * frame.stride + start - 1);
-            (Doubles(S::load_d(lower.add(count))) - Doubles(S::load_d(lower)))
-                - (Doubles(S::load_d(upper.add(count))) - Doubles(S::load_d(upper)))
+/// What a window is made from, from the column of its pixel on.
+#[derive(Debug)]
+struct Places {
+    /// In the ring of integrals, the corners of the half windows to the left and right, above and below: each one's
+    /// left and right above, left and right below.
+    halves: [[usize; 4]; 4],
+    /// One over the points in a half window.
+    share: f64,
+    /// In the ring of points, the ends of both tangents: left and right, above and below.
+    ends: [[usize; 2]; 2],
+}
+
+impl Places {
+    fn of(frame: &Frame, y: usize, side: usize) -> Self {
+        let (half, quarter) = (side / 2, side / 4);
+        let half_window = |first_x: usize, first_y: usize| {
+            let before = first_x.wrapping_sub(1);
+            let row = |y: usize| (frame.place(y) * frame.stride).wrapping_add(before);
+            let above = row(y.wrapping_add(first_y).wrapping_sub(1));
+            let below = row(y.wrapping_add(first_y).wrapping_add(half).wrapping_sub(1));
+            [above, above.wrapping_add(half), below, below.wrapping_add(half)]
+        };
+        let (back, beside) = (half.wrapping_neg(), quarter.wrapping_neg());
+        let end = |x: usize, y: usize| (Planes::start(frame, y)).wrapping_add(x);
+        Places {
+            halves: [
+                half_window(back, beside),
+                half_window(1, beside),
+                half_window(beside, back),
+                half_window(beside, 1),
+            ],
+            share: 1.0 / (half * half) as f64,
+            ends: [
+                [end(beside.wrapping_sub(1), y), end(quarter + 1, y)],
+                [end(usize::MAX, y.wrapping_sub(quarter)), end(1, y.wrapping_add(quarter))],
+            ],
         }
+    }
+}
+
+/// The sum of z over a half window with these corners.
+///
+/// # Safety
+/// The processor has the instruction set of `S`, and the groups at these corners are inside the ring.
+#[inline(always)]
+unsafe fn sum_of<S: Simd>(ring: *const f64, corners: &[usize; 4]) -> Doubles<S> {
+    // SAFETY: as the caller's.
+    unsafe {
+        let [left_above, right_above, left_below, right_below] = *corners;
+        let at = |corner: usize| Doubles(S::load_d(ring.wrapping_add(corner)));
+        (at(right_below) - at(left_below)) - (at(right_above) - at(left_above))
     }
 }
 
@@ -58,7 +89,7 @@ impl Sums for HalfWindows {
     }
 
     fn size(&self) -> usize {
-        self.integrals.capacity() * size_of::<f64>()
+        self.integrals.capacity() * size_of::<f64>() + self.places.capacity() * size_of::<Places>()
     }
 
     #[inline(always)]
@@ -89,35 +120,35 @@ impl Sums for HalfWindows {
         self.last = Some(place);
     }
 
+    fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
+        self.places.clear();
+        self.places.extend((0..=side).map(|side| Places::of(frame, y, side)));
+    }
+
     #[inline(always)]
     unsafe fn of_group<S: Simd>(
         &self,
         frame: &Frame,
         planes: &Planes,
         x: usize,
-        y: usize,
         side: usize,
     ) -> Self::Of8<S> {
-        let (half, quarter) = (side / 2, side / 4);
+        let Places { halves, share, ends } = &self.places[side];
         let x = frame.column(x);
         // SAFETY: as the caller's: rows and columns are held, and so are the groups from these columns on.
         unsafe {
-            let (top, bottom) = (y - quarter - 1, y - quarter + half - 1);
-            let left = self.rows_between::<S>(frame, [top, bottom], x - half, half);
-            let right = self.rows_between::<S>(frame, [top, bottom], x + 1, half);
-            let up = self.rows_between::<S>(frame, [y - half - 1, y - 1], x - quarter, half);
-            let down = self.rows_between::<S>(frame, [y, y + half], x - quarter, half);
-            let share = Doubles::splat(1.0 / (half * half) as f64);
-            let (across, along) = ((right - left) * share, (down - up) * share);
-
-            let (next, before) = (x + quarter + 1, x - quarter - 1);
-            let (above, below) = (y - quarter, y + quarter);
+            let ring = self.integrals.as_ptr().add(x);
+            let share = Doubles::<S>::splat(*share);
+            let [left, right, up, down] = halves;
+            let across = (sum_of::<S>(ring, right) - sum_of(ring, left)) * share;
+            let along = (sum_of::<S>(ring, down) - sum_of(ring, up)) * share;
             let mut tangents = [[across.narrow(); 3], [along.narrow(); 3]];
-            let [own, above, below] = [y, above, below].map(|y| planes.start(frame, y));
             for c in 0..2 {
-                let point = |row: *const f32, x: usize| Floats::load(row.add(c * frame.stride + x));
-                tangents[0][c] = point(own, next) - point(own, before);
-                tangents[1][c] = point(below, x + 1) - point(above, x - 1);
+                let plane = planes.as_ptr().add(x + c * frame.stride);
+                let point = |end: usize| Floats::load(plane.wrapping_add(end));
+                for g in 0..2 {
+                    tangents[g][c] = point(ends[g][1]) - point(ends[g][0]);
+                }
             }
             tangents
         }

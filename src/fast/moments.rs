@@ -24,7 +24,13 @@ pub(crate) struct Moments {
     last: usize,
     /// What the sums' rounding errors stay below.
     error: f64,
+    /// By the side of a window: its corners and its share.
+    places: Vec<(Corners, f64)>,
 }
+
+/// Where in the ring a window's corners are, from the column of its pixel on: left and right above, left and right
+/// below.
+type Corners = [usize; 4];
 
 /// The moments of windows, and one over their numbers of points.
 pub(crate) struct WindowMoments<T> {
@@ -101,6 +107,7 @@ impl Sums for Moments {
 
     fn size(&self) -> usize {
         (self.integrals.capacity() + self.centered.capacity()) * size_of::<f64>()
+            + self.places.capacity() * size_of::<(Corners, f64)>()
     }
 
     #[inline(always)]
@@ -139,31 +146,37 @@ impl Sums for Moments {
         self.error = ROUNDING * (square(3) + square(6) + square(8));
     }
 
+    fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
+        self.places.clear();
+        self.places.extend((0..=side).map(|side| {
+            let before = (side / 2 + 1).wrapping_neg();
+            let row = |y: usize| Self::start_of(frame, frame.place(y)).wrapping_add(before);
+            let above = row(y.wrapping_add(before));
+            let below = row(y.wrapping_add(before).wrapping_add(side));
+            let corners = [above, above.wrapping_add(side), below, below.wrapping_add(side)];
+            (corners, 1.0 / (side * side) as f64)
+        }));
+    }
+
     #[inline(always)]
     unsafe fn of_group<S: Simd>(
         &self,
         frame: &Frame,
         _planes: &Planes,
         x: usize,
-        y: usize,
         side: usize,
     ) -> Self::Of8<S> {
-        let half = side / 2;
-        let left = frame.column(x.wrapping_sub(half + 1));
-        let integrals = self.integrals.as_ptr();
+        let (corners, share) = &self.places[side];
+        let x = frame.column(x);
         // SAFETY: as the caller's: rows and columns are held, and so are the groups from these columns on.
         unsafe {
-            let top = integrals.add(Self::start_of(frame, frame.place(y - half - 1)) + left);
-            let bottom =
-                integrals.add(Self::start_of(frame, frame.place(y - half + side - 1)) + left);
             let mut sums = [Doubles::splat(0.0); CHANNELS];
             for c in 0..CHANNELS {
-                let (top, bottom) = (top.add(c * frame.stride), bottom.add(c * frame.stride));
-                let lower = Doubles(S::load_d(bottom.add(side))) - Doubles(S::load_d(bottom));
-                let upper = Doubles(S::load_d(top.add(side))) - Doubles(S::load_d(top));
-                sums[c] = lower - upper;
+                let plane = self.integrals.as_ptr().add(x + c * frame.stride);
+                let at = |corner: usize| Doubles(S::load_d(plane.wrapping_add(corners[corner])));
+                sums[c] = (at(3) - at(2)) - (at(1) - at(0));
             }
-            WindowMoments { sums, share: Doubles::splat(1.0 / (side * side) as f64) }
+            WindowMoments { sums, share: Doubles::splat(*share) }
         }
     }
 

@@ -79,16 +79,22 @@ impl Planes {
         self.data.capacity() * size_of::<f32>()
     }
 
-    /// Where row `y`'s planes start, a stride apart: for groups here and there, each of which a slice would check.
+    /// Where row `y`'s planes start, a stride apart.
     #[inline(always)]
-    pub fn start(&self, frame: &Frame, y: usize) -> *const f32 {
-        self.data.as_ptr().wrapping_add(frame.place(y) * 3 * frame.stride)
+    pub fn start(frame: &Frame, y: usize) -> usize {
+        frame.place(y) * 3 * frame.stride
+    }
+
+    /// The ring, for groups here and there, each of which a slice would check.
+    #[inline(always)]
+    pub fn as_ptr(&self) -> *const f32 {
+        self.data.as_ptr()
     }
 
     /// Row `y`'s plane of coordinate `c`.
     #[inline(always)]
     pub fn row(&self, frame: &Frame, c: usize, y: usize) -> &[f32] {
-        let start = (frame.place(y) * 3 + c) * frame.stride;
+        let start = Self::start(frame, y) + c * frame.stride;
         &self.data[start..start + frame.stride]
     }
 
@@ -111,7 +117,7 @@ impl Planes {
         limit: f32,
         whole_points: bool,
     ) -> RowNews {
-        let start = frame.place(y) * 3 * frame.stride;
+        let start = Self::start(frame, y);
         let row = &mut self.data[start..start + 3 * frame.stride];
         assert!(MARGIN + (frame.groups() + 1) * GROUP <= frame.stride);
         points.prefetch(y + 2, frame.columns.clone());

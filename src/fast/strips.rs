@@ -24,7 +24,13 @@ pub(crate) struct Strips<const SIMPLE: bool> {
     above: Vec<i32>,
     scale: f32,
     started: bool,
+    /// By the side of a window: its places.
+    places: Vec<Places>,
 }
+
+/// Where in both rings a window's corners are, from the column of its pixel on: left and right above, left and right
+/// below.
+type Places = [[usize; 4]; 2];
 
 /// Horizontal and vertical gradient.
 type Gradients<T> = [[T; 3]; 2];
@@ -41,17 +47,18 @@ impl<const SIMPLE: bool> Strips<SIMPLE> {
         frame.place(y) * 3 * frame.stride
     }
 
-    /// The sum between two columns' strips and between two rows' strips: first and last row that the column strips
-    /// span (the first exclusive), the two columns; the same for the rows.
-    #[inline(always)]
-    fn places(x: usize, y: usize, side: usize) -> [[usize; 4]; 2] {
+    /// The sum between two columns' strips over the window's rows, and between two rows' strips over its columns: the
+    /// prefix sums end before the window and with it.
+    fn places(frame: &Frame, y: usize, side: usize) -> Places {
         let half = side / 2;
-        let (x0, y0) = (x.wrapping_sub(half), y - half);
         let far = if SIMPLE { half + half } else { side };
-        [
-            [y0 - 1, y0 + side - 1, x0, x0.wrapping_add(far)],
-            [x0.wrapping_sub(1), x0.wrapping_add(side - 1), y0, y0 + far],
-        ]
+        let (strips, sums) = ([0, far], [usize::MAX, side.wrapping_sub(1)]);
+        let corners = |rows: [usize; 2], columns: [usize; 2]| {
+            let row = |i: usize| Self::start_of(frame, y.wrapping_sub(half).wrapping_add(rows[i]));
+            let at = |i: usize, j: usize| row(i).wrapping_sub(half).wrapping_add(columns[j]);
+            [at(0, 0), at(0, 1), at(1, 0), at(1, 1)]
+        };
+        [corners(sums, strips), corners(strips, sums)]
     }
 }
 
@@ -76,8 +83,10 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     }
 
     fn size(&self) -> usize {
-        let Strips { columns, rows, last, above, .. } = self;
-        [columns, rows, last, above].iter().map(|b| b.capacity() * size_of::<i32>()).sum()
+        let Strips { columns, rows, last, above, places, .. } = self;
+        let integers =
+            [columns, rows, last, above].map(|b| b.capacity()).into_iter().sum::<usize>();
+        integers * size_of::<i32>() + places.capacity() * size_of::<Places>()
     }
 
     #[inline(always)]
@@ -128,31 +137,28 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
         self.started = true;
     }
 
+    fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
+        self.places.clear();
+        self.places.extend((0..=side).map(|side| Self::places(frame, y, side)));
+    }
+
     #[inline(always)]
     unsafe fn of_group<S: Simd>(
         &self,
         frame: &Frame,
         _planes: &Planes,
         x: usize,
-        y: usize,
         side: usize,
     ) -> Self::Of8<S> {
-        let [[top, bottom, left, right], [before, end, upper, lower]] = Self::places(x, y, side);
+        let [columns, rows] = &self.places[side];
+        let x = frame.column(x);
         // SAFETY: as the caller's: rows and columns are held, and so are the groups from these columns on.
         unsafe {
-            let columns = self.columns.as_ptr();
-            let (top, bottom) = (Self::start_of(frame, top), Self::start_of(frame, bottom));
-            let (top, bottom) = (columns.add(top), columns.add(bottom));
-            let (left, right) = (frame.column(left), frame.column(right));
-            let rows = self.rows.as_ptr();
-            let (upper, lower) = (Self::start_of(frame, upper), Self::start_of(frame, lower));
-            let (upper, lower) = (rows.add(upper), rows.add(lower));
-            let (before, end) = (frame.column(before), frame.column(end));
             let mut sums = Self::none::<S>();
             for c in 0..3 {
-                let plane = c * frame.stride;
-                sums[0][c] = difference::<S>([top, bottom], [plane + left, plane + right]);
-                sums[1][c] = difference::<S>([upper, lower], [plane + before, plane + end]);
+                let x = x + c * frame.stride;
+                sums[0][c] = difference::<S>(self.columns.as_ptr().add(x), columns);
+                sums[1][c] = difference::<S>(self.rows.as_ptr().add(x), rows);
             }
             sums
         }
@@ -254,18 +260,16 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     }
 }
 
-/// Of a ring, the difference between two columns' differences between two rows.
+/// The difference between the right and left of what is below and above, in a ring.
 ///
 /// # Safety
-/// The processor has the instruction set of `S`, and the groups are inside the ring.
+/// The processor has the instruction set of `S`, and the groups at these corners are inside the ring.
 #[inline(always)]
-unsafe fn difference<S: Simd>(rows: [*const i32; 2], columns: [usize; 2]) -> S::I {
+unsafe fn difference<S: Simd>(ring: *const i32, corners: &[usize; 4]) -> S::I {
     // SAFETY: as the caller's.
     unsafe {
-        let at = |row: usize, column: usize| rows[row].add(columns[column]);
-        let lower = S::sub_i(S::load_i(at(1, 1)), S::load_i(at(1, 0)));
-        let upper = S::sub_i(S::load_i(at(0, 1)), S::load_i(at(0, 0)));
-        S::sub_i(lower, upper)
+        let at = |corner: usize| S::load_i(ring.wrapping_add(corners[corner]));
+        S::sub_i(S::sub_i(at(3), at(2)), S::sub_i(at(1), at(0)))
     }
 }
 

@@ -47,8 +47,12 @@ pub(crate) trait Sums {
     /// The processor has the instruction set of `S`.
     unsafe fn push<S: Simd>(&mut self, frame: &Frame, planes: &Planes, y: usize);
 
-    /// The sums of the windows of `side` x `side` around the eight pixels from `(x, y)` on. The windows, and the
-    /// pixels around them, lie inside the image and hold finite points only.
+    /// Finds where in the rings the corners of windows of up to `side` around the pixels of row `y` are: groups ask
+    /// for the same ones again and again.
+    fn aim(&mut self, frame: &Frame, y: usize, side: usize);
+
+    /// The sums of the windows of `side` x `side` around the eight pixels from `x` on of the row aimed at. The
+    /// windows, and the pixels around them, lie inside the image and hold finite points only.
     ///
     /// # Safety
     /// As [`Sums::push`]; the rings hold the rows and columns of the windows.
@@ -57,7 +61,6 @@ pub(crate) trait Sums {
         frame: &Frame,
         planes: &Planes,
         x: usize,
-        y: usize,
         side: usize,
     ) -> Self::Of8<S>;
 
@@ -186,6 +189,7 @@ impl Tile<'_> {
                 unsafe { sums.push::<S>(frame, planes, next) };
                 next += 1;
             }
+            sums.aim(frame, y, side);
             let inner = self.inner(side, y);
             // SAFETY: as the caller's.
             unsafe { self.row::<S, M>(frame, planes, sums, sides, sink, y, &inner, hidden) };
@@ -389,7 +393,7 @@ impl Tile<'_> {
             let (same, side) = group.next_windows(todo);
             todo &= !same;
             let mut of8 = if self.is_inside(group, same, side) {
-                sums.of_group::<S>(frame, planes, group.x, group.y, side)
+                sums.of_group::<S>(frame, planes, group.x, side)
             } else {
                 let mut of8 = M::none::<S>();
                 plain |= self
@@ -400,7 +404,7 @@ impl Tile<'_> {
                 let (same, side) = group.next_windows(todo);
                 todo &= !same;
                 if self.is_inside(group, same, side) {
-                    let these = sums.of_group::<S>(frame, planes, group.x, group.y, side);
+                    let these = sums.of_group::<S>(frame, planes, group.x, side);
                     of8 = M::select::<S>(same, these, of8);
                 } else {
                     plain |= self.put_crossing::<S, M>(
