@@ -186,7 +186,7 @@ pub struct Options {
     pub max_depth_change_factor: f32,
     /// The point the normals are turned towards, in the cloud's coordinates; default the origin.
     pub viewpoint: [f32; 3],
-    /// Worker threads: 1 (the default) computes on the calling thread, 0 takes one per core.
+    /// Worker threads: 1 (the default) computes on the calling thread, 0 takes one per core; at most 1024.
     /// The result does not depend on it, bit for bit.
     pub threads: usize,
     /// Whose windows and sums; default [`Semantics::Pcl`].
@@ -224,8 +224,14 @@ impl Default for Options {
 }
 
 impl Options {
+    /// The most worker threads that can be asked for.
+    pub(crate) const MOST_THREADS: usize = 1024;
+
     /// Refuses what [`Estimator::compute`](crate::Estimator::compute) could not honour.
     pub fn check(&self) -> Result<(), Error> {
+        if self.threads > Self::MOST_THREADS {
+            return Err(Error::OptionValue);
+        }
         if self.semantics == Semantics::Paper {
             if self.method == Method::Simple3DGradient {
                 return Err(Error::Unsupported);

@@ -20,4 +20,7 @@ fn the_checked_in_header_is_the_generated_one() {
     }
     let checked_in = std::fs::read_to_string(&path).unwrap_or_default();
     assert!(checked_in == generated, "run `IINE_BLESS=1 cargo test --test header`");
+    for name in generated.lines().filter_map(|line| line.strip_prefix("#define ")) {
+        assert!(name.starts_with("IINE_"), "{name}: macros know no namespaces");
+    }
 }

@@ -5,12 +5,13 @@ mod clouds;
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
+use std::process::Command;
 
 use clouds::{
     Cloud, Kind, Random, assert_same_bits, compute, edge_options, fast_isas, methods, options,
     paper_options,
 };
-use iine::{BorderPolicy, Error, Estimator, Isa, Method, Normals};
+use iine::{BorderPolicy, Error, Estimator, Isa, Method, Normals, Options};
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
@@ -215,6 +216,12 @@ fn scratch_memory_is_small_and_stays() {
     }
 }
 
+fn write_to(found: &mut [[f32; 4]], estimator: &mut Estimator, cloud: &Cloud) -> Result<(), Error> {
+    let data = found.as_flattened_mut();
+    let mut normals = Normals::interleaved(data, cloud.width, cloud.height, 4, 0, Some(3)).unwrap();
+    estimator.compute(&cloud.view(), &mut normals)
+}
+
 #[test]
 fn memory_that_is_not_there_is_an_error() {
     let cloud = Cloud::new(Kind::NanBlocks, 640, 480, 20);
@@ -223,12 +230,9 @@ fn memory_that_is_not_there_is_an_error() {
     for options in all {
         let mut estimator = Estimator::new(options.clone());
         let mut found = vec![[7.0; 4]; pixels];
-        let data = found.as_flattened_mut();
-        let mut normals =
-            Normals::interleaved(data, cloud.width, cloud.height, 4, 0, Some(3)).unwrap();
         // The map of the whole image takes four bytes a pixel.
         LARGEST.set(4 * pixels - 1);
-        let result = estimator.compute(&cloud.view(), &mut normals);
+        let result = write_to(&mut found, &mut estimator, &cloud);
         LARGEST.set(usize::MAX);
         assert_eq!(result, Err(Error::OutOfMemory), "{options:?}");
         assert!(found.as_flattened().iter().all(|c| *c == 7.0), "{options:?}: partial output");
@@ -236,6 +240,46 @@ fn memory_that_is_not_there_is_an_error() {
         let what = format!("{options:?}");
         assert_same_bits(&compute(&mut estimator, &cloud), &expected, cloud.width, &what);
     }
+}
+
+#[test]
+fn more_threads_than_can_be_asked_for_are_refused() {
+    let cloud = Cloud::new(Kind::Wavy, 64, 48, 18);
+    let mut found = vec![[7.0; 4]; cloud.width * cloud.height];
+    for threads in [1025, usize::MAX] {
+        let mut estimator = Estimator::new(Options::default());
+        estimator.options_mut().threads = threads;
+        assert_eq!(write_to(&mut found, &mut estimator, &cloud), Err(Error::OptionValue));
+        assert!(found.as_flattened().iter().all(|c| *c == 7.0), "partial output");
+    }
+}
+
+/// Runs this test once more, in a process with little address space, where few threads' stacks fit.
+#[cfg(target_os = "linux")]
+#[test]
+fn threads_that_cannot_start_are_an_error() {
+    const LIMITED: &str = "IINE_TEST_LIMITED";
+    if std::env::var_os(LIMITED).is_none() {
+        let output = Command::new("sh")
+            .args(["-c", "ulimit -v 400000 && exec \"$0\" \"$@\""])
+            .arg(std::env::current_exe().unwrap())
+            .args(["--exact", "threads_that_cannot_start_are_an_error", "--test-threads=1"])
+            .env(LIMITED, "1")
+            .output()
+            .unwrap();
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success() && said.contains("1 passed"), "{output:?}");
+        return;
+    }
+    let cloud = Cloud::new(Kind::Wavy, 64, 48, 19);
+    let mut found = vec![[7.0; 4]; cloud.width * cloud.height];
+    let mut estimator = Estimator::new(Options::default());
+    estimator.options_mut().threads = 1024;
+    assert_eq!(write_to(&mut found, &mut estimator, &cloud), Err(Error::Threads));
+    assert!(found.as_flattened().iter().all(|c| *c == 7.0), "partial output");
+    estimator.options_mut().threads = 1;
+    let expected = compute(&mut Estimator::new(Options::default()), &cloud);
+    assert_same_bits(&compute(&mut estimator, &cloud), &expected, cloud.width, "one thread");
 }
 
 #[test]

@@ -158,17 +158,6 @@
 #define IINE_VERSION_PATCH 0
 
 /**
- * The fewest points that tell how well a plane fits.
- */
-#define Plane_FEWEST 6.0
-
-/**
- * Points are on one line of the image if the determinant of their positions' scatter is at most this share of
- * the product of its diagonal: rounding.
- */
-#define Plane_LINE 1e-6
-
-/**
  * Estimates normals. Owns its options and its scratch memory, which is reused from frame to frame.
  *
  * One estimator is used by one thread at a time; different estimators freely.

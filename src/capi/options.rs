@@ -181,10 +181,11 @@ pub unsafe extern "C" fn iine_estimator_set_threads(
     threads: u32,
 ) -> i32 {
     let change = |options: &mut Options| {
-        if threads > 1024 {
+        let threads = threads as usize;
+        if threads > Options::MOST_THREADS {
             return Err(Error::OptionValue);
         }
-        options.threads = threads as usize;
+        options.threads = threads;
         Ok(())
     };
     // SAFETY: promised by the caller.

@@ -24,10 +24,10 @@ pub(crate) struct Plane {
 
 impl Plane {
     /// The fewest points that tell how well a plane fits.
-    pub const FEWEST: f64 = 6.0;
+    pub(crate) const FEWEST: f64 = 6.0;
     /// Points are on one line of the image if the determinant of their positions' scatter is at most this share of
     /// the product of its diagonal: rounding.
-    pub const LINE: f64 = 1e-6;
+    pub(crate) const LINE: f64 = 1e-6;
 
     /// None if there are too few finite points to tell how well the plane fits, or if they are on one line of the
     /// image.
