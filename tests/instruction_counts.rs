@@ -27,14 +27,14 @@ use Semantics::{Paper, Pcl};
 
 /// Instructions a pixel at most: with AVX2, with SSE2. The paper has no border policies.
 const BOUNDS: [(Semantics, Method, BorderPolicy, u64, u64); 10] = [
-    (Pcl, CovarianceMatrix, Ignore, 221, 448),
-    (Pcl, CovarianceMatrix, Mirror, 285, 526),
-    (Pcl, Average3DGradient, Ignore, 115, 193),
-    (Pcl, Average3DGradient, Mirror, 157, 241),
-    (Pcl, AverageDepthChange, Ignore, 132, 209),
-    (Pcl, AverageDepthChange, Mirror, 224, 311),
-    (Pcl, Simple3DGradient, Ignore, 113, 186),
-    (Paper, CovarianceMatrix, Ignore, 271, 486),
+    (Pcl, CovarianceMatrix, Ignore, 209, 436),
+    (Pcl, CovarianceMatrix, Mirror, 273, 516),
+    (Pcl, Average3DGradient, Ignore, 110, 191),
+    (Pcl, Average3DGradient, Mirror, 150, 237),
+    (Pcl, AverageDepthChange, Ignore, 114, 201),
+    (Pcl, AverageDepthChange, Mirror, 206, 298),
+    (Pcl, Simple3DGradient, Ignore, 106, 186),
+    (Paper, CovarianceMatrix, Ignore, 265, 486),
     (Paper, Average3DGradient, Ignore, 235, 348),
     (Paper, AverageDepthChange, Ignore, 221, 368),
 ];
