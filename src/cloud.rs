@@ -306,7 +306,7 @@ impl<'a> Points<'a> {
         let step = self.grid.point_stride;
         let inside = columns.end.min(self.grid.width - 1).saturating_sub(columns.start);
         let whole = if whole_points { inside } else { 0 };
-        PointRow { points: self, y, first: self.x.wrapping_byte_add(offset), step, whole, columns }
+        PointRow { points: self, y, columns, first: self.x.wrapping_byte_add(offset), step, whole }
     }
 }
 
@@ -329,7 +329,7 @@ impl PointRow<'_> {
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     pub unsafe fn group<S: Simd>(&self, at: usize) -> [S::F; 3] {
-        // SAFETY: as the caller's; the points that are read whole are inside the row, and not its last.
+        // SAFETY: as the caller's; eight points are inside the row, and of those that are read whole none is its last.
         unsafe {
             if at + GROUP <= self.whole {
                 let low = self.first.byte_add(at * self.step);
@@ -341,6 +341,12 @@ impl PointRow<'_> {
                     S::load_halves(low.byte_add(3 * self.step), high.byte_add(3 * self.step)),
                 ]);
                 return [x, y, z];
+            }
+            if self.step == FIELD && at + GROUP <= self.columns.len() {
+                let place = self.points.grid.offset(self.columns.start + at, self.y);
+                let Points { x, y, z, .. } = *self.points;
+                let [x, y, z] = [x, y, z].map(|field| field.byte_add(place));
+                return [S::load(x), S::load(y), S::load(z)];
             }
             let [x, y, z] = self.gather(at);
             [S::load(x.as_ptr()), S::load(y.as_ptr()), S::load(z.as_ptr())]
