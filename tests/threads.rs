@@ -8,8 +8,8 @@ use std::cell::Cell;
 use std::process::Command;
 
 use clouds::{
-    Cloud, Kind, Random, assert_same_bits, compute, edge_options, fast_isas, methods, options,
-    paper_options,
+    Cloud, Kind, Random, assert_same_bits, compute, compute_to, edge_options, fast_isas, methods,
+    options, paper_options,
 };
 use iine::{BorderPolicy, Error, Estimator, Isa, Method, Normals, Options};
 
@@ -216,12 +216,6 @@ fn scratch_memory_is_small_and_stays() {
     }
 }
 
-fn write_to(found: &mut [[f32; 4]], estimator: &mut Estimator, cloud: &Cloud) -> Result<(), Error> {
-    let data = found.as_flattened_mut();
-    let mut normals = Normals::interleaved(data, cloud.width, cloud.height, 4, 0, Some(3)).unwrap();
-    estimator.compute(&cloud.view(), &mut normals)
-}
-
 #[test]
 fn memory_that_is_not_there_is_an_error() {
     let cloud = Cloud::new(Kind::NanBlocks, 640, 480, 20);
@@ -232,7 +226,7 @@ fn memory_that_is_not_there_is_an_error() {
         let mut found = vec![[7.0; 4]; pixels];
         // The map of the whole image takes four bytes a pixel.
         LARGEST.set(4 * pixels - 1);
-        let result = write_to(&mut found, &mut estimator, &cloud);
+        let result = compute_to(&mut found, &mut estimator, &cloud);
         LARGEST.set(usize::MAX);
         assert_eq!(result, Err(Error::OutOfMemory), "{options:?}");
         assert!(found.as_flattened().iter().all(|c| *c == 7.0), "{options:?}: partial output");
@@ -245,13 +239,17 @@ fn memory_that_is_not_there_is_an_error() {
 #[test]
 fn more_threads_than_can_be_asked_for_are_refused() {
     let cloud = Cloud::new(Kind::Wavy, 64, 48, 18);
-    let mut found = vec![[7.0; 4]; cloud.width * cloud.height];
     for threads in [1025, usize::MAX] {
         let mut estimator = Estimator::new(Options::default());
         estimator.options_mut().threads = threads;
-        assert_eq!(write_to(&mut found, &mut estimator, &cloud), Err(Error::OptionValue));
-        assert!(found.as_flattened().iter().all(|c| *c == 7.0), "partial output");
+        assert_writes_nothing(&mut estimator, &cloud, Error::OptionValue);
     }
+}
+
+fn assert_writes_nothing(estimator: &mut Estimator, cloud: &Cloud, error: Error) {
+    let mut found = vec![[7.0; 4]; cloud.width * cloud.height];
+    assert_eq!(compute_to(&mut found, estimator, cloud), Err(error));
+    assert!(found.as_flattened().iter().all(|c| *c == 7.0), "partial output");
 }
 
 /// Runs this test once more, in a process with little address space, where few threads' stacks fit.
@@ -272,11 +270,9 @@ fn threads_that_cannot_start_are_an_error() {
         return;
     }
     let cloud = Cloud::new(Kind::Wavy, 64, 48, 19);
-    let mut found = vec![[7.0; 4]; cloud.width * cloud.height];
     let mut estimator = Estimator::new(Options::default());
     estimator.options_mut().threads = 1024;
-    assert_eq!(write_to(&mut found, &mut estimator, &cloud), Err(Error::Threads));
-    assert!(found.as_flattened().iter().all(|c| *c == 7.0), "partial output");
+    assert_writes_nothing(&mut estimator, &cloud, Error::Threads);
     estimator.options_mut().threads = 1;
     let expected = compute(&mut Estimator::new(Options::default()), &cloud);
     assert_same_bits(&compute(&mut estimator, &cloud), &expected, cloud.width, "one thread");

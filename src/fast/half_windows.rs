@@ -1,8 +1,9 @@
 //! Sums of half windows of z, for AVERAGE_DEPTH_CHANGE: the paper's one integral image, in f64.
 
 use super::arithmetic::{Doubles, Floats, cross, dot};
-use super::planes::{Frame, MARGIN, Planes, grow};
+use super::planes::{Corners, Frame, MARGIN, Planes, grow, sum_between};
 use super::tile::{Found, Sums};
+use crate::paper::refill;
 use crate::simd::twice::Twice;
 use crate::simd::{GROUP, Simd};
 use crate::window::Image;
@@ -25,9 +26,8 @@ const DOUBT_SINE: f32 = 1e-6;
 /// What a window is made from, from the column of its pixel on.
 #[derive(Debug)]
 struct Places {
-    /// In the ring of integrals, the corners of the half windows to the left and right, above and below: each one's
-    /// left and right above, left and right below.
-    halves: [[usize; 4]; 4],
+    /// In the ring of integrals: the half windows to the left and right, above and below.
+    halves: [Corners; 4],
     /// One over the points in a half window.
     share: f64,
     /// In the ring of points, the ends of both tangents: left and right, above and below.
@@ -36,43 +36,26 @@ struct Places {
 
 impl Places {
     fn of(frame: &Frame, y: usize, side: usize) -> Self {
-        let (half, quarter) = (side / 2, side / 4);
-        let half_window = |first_x: usize, first_y: usize| {
-            let before = first_x.wrapping_sub(1);
-            let row = |y: usize| (frame.place(y) * frame.stride).wrapping_add(before);
-            let above = row(y.wrapping_add(first_y).wrapping_sub(1));
-            let below = row(y.wrapping_add(first_y).wrapping_add(half).wrapping_sub(1));
-            [above, above.wrapping_add(half), below, below.wrapping_add(half)]
+        let (half, quarter) = ((side / 2) as isize, (side / 4) as isize);
+        // Integrals end before a half window and with it.
+        let ends = |first: isize| [first - 1, first + half - 1];
+        let half_window = |x: isize, row: isize| frame.corners(1, y, ends(row), ends(x));
+        let point = |x: isize, row: isize| {
+            frame.start(3, y.wrapping_add_signed(row)).wrapping_add_signed(x)
         };
-        let (back, beside) = (half.wrapping_neg(), quarter.wrapping_neg());
-        let end = |x: usize, y: usize| (Planes::start(frame, y)).wrapping_add(x);
         Places {
             halves: [
-                half_window(back, beside),
-                half_window(1, beside),
-                half_window(beside, back),
-                half_window(beside, 1),
+                half_window(-half, -quarter),
+                half_window(1, -quarter),
+                half_window(-quarter, -half),
+                half_window(-quarter, 1),
             ],
             share: 1.0 / (half * half) as f64,
             ends: [
-                [end(beside.wrapping_sub(1), y), end(quarter + 1, y)],
-                [end(usize::MAX, y.wrapping_sub(quarter)), end(1, y.wrapping_add(quarter))],
+                [point(-quarter - 1, 0), point(quarter + 1, 0)],
+                [point(-1, -quarter), point(1, quarter)],
             ],
         }
-    }
-}
-
-/// The sum of z over a half window with these corners.
-///
-/// # Safety
-/// The processor has the instruction set of `S`, and the groups at these corners are inside the ring.
-#[inline(always)]
-unsafe fn sum_of<S: Simd>(ring: *const f64, corners: &[usize; 4]) -> Doubles<S> {
-    // SAFETY: as the caller's.
-    unsafe {
-        let [left_above, right_above, left_below, right_below] = *corners;
-        let at = |corner: usize| Doubles(S::load_d(ring.wrapping_add(corner)));
-        (at(right_below) - at(left_below)) - (at(right_above) - at(left_above))
     }
 }
 
@@ -121,8 +104,7 @@ impl Sums for HalfWindows {
     }
 
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
-        self.places.clear();
-        self.places.extend((0..=side).map(|side| Places::of(frame, y, side)));
+        refill(&mut self.places, (0..=side).map(|side| Places::of(frame, y, side)));
     }
 
     #[inline(always)]
@@ -140,8 +122,8 @@ impl Sums for HalfWindows {
             let ring = self.integrals.as_ptr().add(x);
             let share = Doubles::<S>::splat(*share);
             let [left, right, up, down] = halves;
-            let across = (sum_of::<S>(ring, right) - sum_of(ring, left)) * share;
-            let along = (sum_of::<S>(ring, down) - sum_of(ring, up)) * share;
+            let across = (sum_between::<S>(ring, right) - sum_between(ring, left)) * share;
+            let along = (sum_between::<S>(ring, down) - sum_between(ring, up)) * share;
             let mut tangents = [[across.narrow(); 3], [along.narrow(); 3]];
             for c in 0..2 {
                 let plane = planes.as_ptr().add(x + c * frame.stride);

@@ -2,10 +2,10 @@
 //! about a point of the tile.
 
 use super::arithmetic::{Doubles, Floats, dot};
-use super::planes::{Frame, MARGIN, Planes, grow};
+use super::planes::{Corners, Frame, MARGIN, Planes, grow, sum_between};
 use super::tile::{Found, Sums};
 use crate::cloud::Points;
-use crate::paper::ROUNDING;
+use crate::paper::{ROUNDING, refill};
 use crate::simd::twice::Twice;
 use crate::simd::{GROUP, Simd};
 use crate::window::Image;
@@ -27,10 +27,6 @@ pub(crate) struct Moments {
     /// By the side of a window: its corners and its share.
     places: Vec<(Corners, f64)>,
 }
-
-/// Where in the ring a window's corners are, from the column of its pixel on: left and right above, left and right
-/// below.
-type Corners = [usize; 4];
 
 /// The moments of windows, and one over their numbers of points.
 pub(crate) struct WindowMoments<T> {
@@ -147,15 +143,12 @@ impl Sums for Moments {
     }
 
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
-        self.places.clear();
-        self.places.extend((0..=side).map(|side| {
-            let before = (side / 2 + 1).wrapping_neg();
-            let row = |y: usize| Self::start_of(frame, frame.place(y)).wrapping_add(before);
-            let above = row(y.wrapping_add(before));
-            let below = row(y.wrapping_add(before).wrapping_add(side));
-            let corners = [above, above.wrapping_add(side), below, below.wrapping_add(side)];
-            (corners, 1.0 / (side * side) as f64)
-        }));
+        let place = |side: usize| {
+            let before = -((side / 2) as isize) - 1;
+            let ends = [before, before + side as isize];
+            (frame.corners(CHANNELS, y, ends, ends), 1.0 / (side * side) as f64)
+        };
+        refill(&mut self.places, (0..=side).map(place));
     }
 
     #[inline(always)]
@@ -173,8 +166,7 @@ impl Sums for Moments {
             let mut sums = [Doubles::splat(0.0); CHANNELS];
             for c in 0..CHANNELS {
                 let plane = self.integrals.as_ptr().add(x + c * frame.stride);
-                let at = |corner: usize| Doubles(S::load_d(plane.wrapping_add(corners[corner])));
-                sums[c] = (at(3) - at(2)) - (at(1) - at(0));
+                sums[c] = sum_between(plane, corners);
             }
             WindowMoments { sums, share: Doubles::splat(*share) }
         }
@@ -231,8 +223,7 @@ impl Sums for Moments {
                     if end_row == 0 {
                         return 0.0;
                     }
-                    let place = frame.place(end_row - 1);
-                    let row = Self::start_of(frame, place) + c * frame.stride;
+                    let row = frame.start(CHANNELS, end_row - 1) + c * frame.stride;
                     self.integrals[row + frame.column(rect.x.end) - 1]
                         - self.integrals[row + frame.column(rect.x.start) - 1]
                 };

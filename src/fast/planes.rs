@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::arithmetic::Doubles;
 use crate::cloud::Points;
 use crate::simd::{GROUP, Simd};
 
@@ -41,10 +42,48 @@ impl Frame {
         y & (self.ring - 1)
     }
 
+    /// Where row `y` starts in a ring of so many planes, which are a stride apart.
+    #[inline(always)]
+    pub fn start(&self, planes: usize, y: usize) -> usize {
+        self.place(y) * planes * self.stride
+    }
+
+    /// The corners of what lies between two rows, counted from row `y`, and two columns, counted from a pixel's, in a
+    /// ring of so many planes.
+    pub fn corners(
+        &self,
+        planes: usize,
+        y: usize,
+        [above, below]: [isize; 2],
+        [left, right]: [isize; 2],
+    ) -> Corners {
+        let at = |row: isize, column: isize| {
+            self.start(planes, y.wrapping_add_signed(row)).wrapping_add_signed(column)
+        };
+        [at(above, left), at(above, right), at(below, left), at(below, right)]
+    }
+
     /// Index of column `x` in a row; `x` may be up to the margin before the columns.
     #[inline(always)]
     pub fn column(&self, x: usize) -> usize {
         x.wrapping_add(MARGIN).wrapping_sub(self.columns.start)
+    }
+}
+
+/// Left and right above, left and right below. Before a pixel's column is added, they may be wrapped around zero.
+pub(crate) type Corners = [usize; 4];
+
+/// The sum between the corners, of integral rows.
+///
+/// # Safety
+/// The processor has the instruction set of `S`, and the groups at these corners are inside the ring.
+#[inline(always)]
+pub(crate) unsafe fn sum_between<S: Simd>(ring: *const f64, corners: &Corners) -> Doubles<S> {
+    let [left_above, right_above, left_below, right_below] = *corners;
+    // SAFETY: as the caller's.
+    unsafe {
+        let at = |corner: usize| Doubles(S::load_d(ring.wrapping_add(corner)));
+        (at(right_below) - at(left_below)) - (at(right_above) - at(left_above))
     }
 }
 
@@ -79,12 +118,6 @@ impl Planes {
         self.data.capacity() * size_of::<f32>()
     }
 
-    /// Where row `y`'s planes start, a stride apart.
-    #[inline(always)]
-    pub fn start(frame: &Frame, y: usize) -> usize {
-        frame.place(y) * 3 * frame.stride
-    }
-
     /// The ring, for groups here and there, each of which a slice would check.
     #[inline(always)]
     pub fn as_ptr(&self) -> *const f32 {
@@ -94,7 +127,7 @@ impl Planes {
     /// Row `y`'s plane of coordinate `c`.
     #[inline(always)]
     pub fn row(&self, frame: &Frame, c: usize, y: usize) -> &[f32] {
-        let start = Self::start(frame, y) + c * frame.stride;
+        let start = frame.start(3, y) + c * frame.stride;
         &self.data[start..start + frame.stride]
     }
 
@@ -117,7 +150,7 @@ impl Planes {
         limit: f32,
         whole_points: bool,
     ) -> RowNews {
-        let start = Self::start(frame, y);
+        let start = frame.start(3, y);
         let row = &mut self.data[start..start + 3 * frame.stride];
         assert!(MARGIN + (frame.groups() + 1) * GROUP <= frame.stride);
         points.prefetch(y + 2, frame.columns.clone());

@@ -6,8 +6,9 @@
 //! as long as the differences fit, and the limit on the coordinates sees to that.
 
 use super::arithmetic::{Floats, cross, dot};
-use super::planes::{Frame, MARGIN, Planes, grow};
+use super::planes::{Corners, Frame, MARGIN, Planes, grow};
 use super::tile::{Found, Sums};
+use crate::paper::refill;
 use crate::simd::twice::Twice;
 use crate::simd::{GROUP, Simd};
 use crate::window::Image;
@@ -28,9 +29,8 @@ pub(crate) struct Strips<const SIMPLE: bool> {
     places: Vec<Places>,
 }
 
-/// Where in both rings a window's corners are, from the column of its pixel on: left and right above, left and right
-/// below.
-type Places = [[usize; 4]; 2];
+/// In the ring of columns and in that of rows.
+type Places = [Corners; 2];
 
 /// Horizontal and vertical gradient.
 type Gradients<T> = [[T; 3]; 2];
@@ -41,24 +41,13 @@ const DOUBT_ROUNDING: f32 = 4e8;
 const DOUBT_SINE: f32 = 1e-6;
 
 impl<const SIMPLE: bool> Strips<SIMPLE> {
-    /// Where row `y` starts in a ring; the planes of its coordinates are a stride apart.
-    #[inline(always)]
-    fn start_of(frame: &Frame, y: usize) -> usize {
-        frame.place(y) * 3 * frame.stride
-    }
-
     /// The sum between two columns' strips over the window's rows, and between two rows' strips over its columns: the
     /// prefix sums end before the window and with it.
     fn places(frame: &Frame, y: usize, side: usize) -> Places {
-        let half = side / 2;
-        let far = if SIMPLE { half + half } else { side };
-        let (strips, sums) = ([0, far], [usize::MAX, side.wrapping_sub(1)]);
-        let corners = |rows: [usize; 2], columns: [usize; 2]| {
-            let row = |i: usize| Self::start_of(frame, y.wrapping_sub(half).wrapping_add(rows[i]));
-            let at = |i: usize, j: usize| row(i).wrapping_sub(half).wrapping_add(columns[j]);
-            [at(0, 0), at(0, 1), at(1, 0), at(1, 1)]
-        };
-        [corners(sums, strips), corners(strips, sums)]
+        let (half, side) = ((side / 2) as isize, side as isize);
+        let far = if SIMPLE { half } else { side - half };
+        let (strips, sums) = ([-half, far], [-half - 1, side - half - 1]);
+        [frame.corners(3, y, sums, strips), frame.corners(3, y, strips, sums)]
     }
 }
 
@@ -95,8 +84,8 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
         let groups = frame.groups() + 1; // the strips' groups may reach one further
         for c in 0..3 {
             let start = c * frame.stride;
-            let own = Self::start_of(frame, y) + start;
-            let above = if self.started { Self::start_of(frame, y - 1) + start } else { own };
+            let own = frame.start(3, y) + start;
+            let above = if self.started { frame.start(3, y - 1) + start } else { own };
             let from = planes.row(frame, c, y).as_ptr();
             let last = &mut self.last[start..start + frame.stride];
             let pair = &self.above[start..start + frame.stride];
@@ -138,8 +127,7 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     }
 
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
-        self.places.clear();
-        self.places.extend((0..=side).map(|side| Self::places(frame, y, side)));
+        refill(&mut self.places, (0..=side).map(|side| Self::places(frame, y, side)));
     }
 
     #[inline(always)]
@@ -210,11 +198,9 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
             let (x0, x1) = (inside.x.start, inside.x.end);
             let (y0, y1) = (inside.y.start, inside.y.end);
             for c in 0..3 {
-                let column = |y, x| {
-                    self.columns[Self::start_of(frame, y) + c * frame.stride + frame.column(x)]
-                };
-                let row =
-                    |y, x| self.rows[Self::start_of(frame, y) + c * frame.stride + frame.column(x)];
+                let column =
+                    |y, x| self.columns[frame.start(3, y) + c * frame.stride + frame.column(x)];
+                let row = |y, x| self.rows[frame.start(3, y) + c * frame.stride + frame.column(x)];
                 let strip = |x| column(y1 - 1, x).wrapping_sub(column(y0 - 1, x));
                 let segment = |y| row(y, x1 - 1).wrapping_sub(row(y, x0 - 1));
                 sums[0][c] = sums[0][c].wrapping_add(strip(x1).wrapping_sub(strip(x0)));
@@ -265,7 +251,7 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
 /// # Safety
 /// The processor has the instruction set of `S`, and the groups at these corners are inside the ring.
 #[inline(always)]
-unsafe fn difference<S: Simd>(ring: *const i32, corners: &[usize; 4]) -> S::I {
+unsafe fn difference<S: Simd>(ring: *const i32, corners: &Corners) -> S::I {
     // SAFETY: as the caller's.
     unsafe {
         let at = |corner: usize| S::load_i(ring.wrapping_add(corners[corner]));

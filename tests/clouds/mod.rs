@@ -4,7 +4,7 @@
 #![allow(dead_code)] // every test takes what it needs
 
 use iine::{
-    BorderPolicy, Depth, DistanceMetric, Estimator, Isa, Method, Normals, Options, Points,
+    BorderPolicy, Depth, DistanceMetric, Error, Estimator, Isa, Method, Normals, Options, Points,
     Semantics,
 };
 
@@ -278,10 +278,19 @@ pub fn edge_options() -> Vec<Options> {
 /// nx, ny, nz, curvature of every pixel.
 pub fn compute(estimator: &mut Estimator, cloud: &Cloud) -> Vec<[f32; 4]> {
     let mut found = vec![[7.0; 4]; cloud.width * cloud.height];
+    compute_to(&mut found, estimator, cloud).unwrap();
+    found
+}
+
+/// [`compute`], to where the normals are to be written.
+pub fn compute_to(
+    found: &mut [[f32; 4]],
+    estimator: &mut Estimator,
+    cloud: &Cloud,
+) -> Result<(), Error> {
     let data = found.as_flattened_mut();
     let mut normals = Normals::interleaved(data, cloud.width, cloud.height, 4, 0, Some(3)).unwrap();
-    estimator.compute(&cloud.view(), &mut normals).unwrap();
-    found
+    estimator.compute(&cloud.view(), &mut normals)
 }
 
 /// The angle between two unit vectors in degrees, well conditioned also where it is small.
