@@ -8,7 +8,7 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 use crate::Error;
-use crate::simd::{GROUP, Simd};
+use crate::simd::{GROUP, Groups};
 
 /// The geometry that all fields of a view share. Strides are in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -328,7 +328,7 @@ impl PointRow<'_> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn group<S: Simd>(&self, at: usize) -> [S::F; 3] {
+    pub unsafe fn group<S: Groups>(&self, at: usize) -> [S::F; 3] {
         // SAFETY: as the caller's; eight points are inside the row, and of those that are read whole none is its last.
         unsafe {
             if at + GROUP <= self.whole {

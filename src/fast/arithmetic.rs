@@ -1,4 +1,4 @@
-//! Operators for groups of eight, so that formulas read as formulas.
+//! Operators for groups and pairs of groups, so that formulas read as formulas.
 //!
 //! Values exist only where the processor has the instruction set of `S`: they are made from groups of `S`, in functions
 //! whose callers promise it.
@@ -7,10 +7,10 @@ use std::ops::{Add, Div, Mul, Sub};
 
 use crate::simd::Simd;
 
-/// Eight f32.
+/// As many f32 as there are lanes.
 pub(crate) struct Floats<S: Simd>(pub S::F);
 
-/// Eight f64.
+/// As many f64 as there are lanes.
 pub(crate) struct Doubles<S: Simd>(pub S::D);
 
 macro_rules! operators {
@@ -46,7 +46,7 @@ impl<S: Simd> Floats<S> {
     }
 
     /// # Safety
-    /// The processor has the instruction set of `S`; there are eight floats.
+    /// The processor has the instruction set of `S`; there are so many floats.
     #[inline(always)]
     pub unsafe fn load(from: *const f32) -> Self {
         // SAFETY: as the caller's.

@@ -4,8 +4,7 @@ use super::arithmetic::{Doubles, Floats, cross, dot};
 use super::planes::{Corners, Frame, MARGIN, Planes, grow, sum_between};
 use super::tile::{Found, Sums};
 use crate::paper::refill;
-use crate::simd::twice::Twice;
-use crate::simd::{GROUP, Simd};
+use crate::simd::{GROUP, Groups, Simd};
 use crate::window::Image;
 
 /// The ring of integral rows of z.
@@ -60,7 +59,7 @@ impl Places {
 }
 
 impl Sums for HalfWindows {
-    type Of8<S: Simd> = Tangents<Floats<S>>;
+    type OfLanes<S: Simd> = Tangents<Floats<S>>;
     type Of1 = Tangents<f32>;
 
     const COLUMN: usize = size_of::<f64>();
@@ -76,7 +75,7 @@ impl Sums for HalfWindows {
     }
 
     #[inline(always)]
-    unsafe fn push<S: Simd>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
+    unsafe fn push<S: Groups>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
         let place = frame.place(y);
         let groups = frame.groups() + 1;
         assert!(MARGIN + groups * GROUP <= frame.stride);
@@ -108,13 +107,13 @@ impl Sums for HalfWindows {
     }
 
     #[inline(always)]
-    unsafe fn of_group<S: Simd>(
+    unsafe fn of_pixels<S: Simd>(
         &self,
         frame: &Frame,
         planes: &Planes,
         x: usize,
         side: usize,
-    ) -> Self::Of8<S> {
+    ) -> Self::OfLanes<S> {
         let Places { halves, share, ends } = &self.places[side];
         let x = frame.column(x);
         // SAFETY: as the caller's: rows and columns are held, and so are the groups from these columns on.
@@ -137,7 +136,11 @@ impl Sums for HalfWindows {
     }
 
     #[inline(always)]
-    unsafe fn select<S: Simd>(lanes: u32, yes: Self::Of8<S>, no: Self::Of8<S>) -> Self::Of8<S> {
+    unsafe fn select<S: Simd>(
+        lanes: u32,
+        yes: Self::OfLanes<S>,
+        no: Self::OfLanes<S>,
+    ) -> Self::OfLanes<S> {
         let mut tangents = no;
         for g in 0..2 {
             for c in 0..3 {
@@ -150,15 +153,19 @@ impl Sums for HalfWindows {
     }
 
     #[inline(always)]
-    fn pair<S: Simd>(first: Self::Of8<S>, second: Self::Of8<S>) -> Self::Of8<Twice<S>> {
-        let both = |a: Floats<S>, b: Floats<S>| Floats([a.0, b.0]);
+    fn pair<S: Groups>(
+        first: Self::OfLanes<S>,
+        second: Self::OfLanes<S>,
+    ) -> Self::OfLanes<S::Pair> {
+        // SAFETY: there are groups, so there is the instruction set.
+        let both = |a: Floats<S>, b: Floats<S>| Floats(unsafe { S::pair(a.0, b.0) });
         let [[a, b, c], [d, e, f]] = first;
         let [[g, h, i], [j, k, l]] = second;
         [[both(a, g), both(b, h), both(c, i)], [both(d, j), both(e, k), both(f, l)]]
     }
 
     #[inline(always)]
-    unsafe fn none<S: Simd>() -> Self::Of8<S> {
+    unsafe fn none<S: Simd>() -> Self::OfLanes<S> {
         // SAFETY: as the caller's.
         [[unsafe { Floats::splat(0.0) }; 3]; 2]
     }
@@ -210,7 +217,7 @@ impl Sums for HalfWindows {
     }
 
     #[inline(always)]
-    unsafe fn put<S: Simd>(tangents: &mut Self::Of8<S>, lane: usize, one: Self::Of1) {
+    unsafe fn put<S: Simd>(tangents: &mut Self::OfLanes<S>, lane: usize, one: Self::Of1) {
         for g in 0..2 {
             for c in 0..3 {
                 // SAFETY: as the caller's.
@@ -225,7 +232,7 @@ impl Sums for HalfWindows {
     unsafe fn estimate<S: Simd>(
         &self,
         _frame: &Frame,
-        tangents: &Self::Of8<S>,
+        tangents: &Self::OfLanes<S>,
         sides: S::F,
         _lanes: u32,
         _fresh: u32,

@@ -32,21 +32,22 @@ impl Lanes {
         lanes
     }
 
-    /// Both groups of a vector path.
+    /// # Safety
+    /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn load<S: Simd>(&self) -> [S::F; 2] {
-        // SAFETY: as the caller's; 16 floats are two groups.
-        unsafe { [S::load(self.0.as_ptr()), S::load(self.0.as_ptr().add(GROUP))] }
+    pub unsafe fn load<S: Simd>(&self) -> S::F {
+        const { assert!(S::LANES == LANES) };
+        // SAFETY: as the caller's; all of it is loaded.
+        unsafe { S::load(self.0.as_ptr()) }
     }
 
-    /// Replaces one of both groups.
-    ///
     /// # Safety
-    /// The processor has the instruction set of `S`; `group` is 0 or 1.
+    /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn store_group<S: Simd>(&mut self, group: usize, value: S::F) {
-        // SAFETY: as the caller's; 16 floats are two groups.
-        unsafe { S::store(self.0.as_mut_ptr().add(group * GROUP), value) };
+    pub unsafe fn store<S: Simd>(&mut self, value: S::F) {
+        const { assert!(S::LANES == LANES) };
+        // SAFETY: as the caller's; all of it is stored.
+        unsafe { S::store(self.0.as_mut_ptr(), value) };
     }
 }
 

@@ -35,7 +35,7 @@ use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::options::{Method, Options};
 use crate::paper::refill;
-use crate::simd::{GROUP, Simd};
+use crate::simd::{GROUP, Groups};
 use crate::smoothing_area::depth_smoothing;
 use crate::threads::Workers;
 use crate::window::Image;
@@ -353,14 +353,14 @@ impl Task for SweepTask<'_> {
     type Output = f32;
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) -> f32 {
+    unsafe fn run<S: Groups>(self) -> f32 {
         let SweepTask { job, chunk, rows, sweep } = self;
         let mut windows = WindowRows::new(job.image.width, rows);
         let swept = (chunk.swept.start, chunk.swept.len());
         // SAFETY: as the caller's.
         unsafe {
-            let largest = windows.sweep_down::<S>(job.points, job.options, swept, sweep);
-            windows.sweep_up::<S>(job.points, job.options, swept, sweep);
+            let largest = windows.sweep_down::<S::Pair>(job.points, job.options, swept, sweep);
+            windows.sweep_up::<S::Pair>(job.points, job.options, swept, sweep);
             largest
         }
     }
@@ -378,7 +378,7 @@ impl<'r, F: Fn(usize) -> &'r [f32]> Task for TileTask<'_, F> {
     type Output = Result<(), BeyondLimit>;
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) -> Result<(), BeyondLimit> {
+    unsafe fn run<S: Groups>(self) -> Result<(), BeyondLimit> {
         let TileTask { tile, scratch, sides, sink } = self;
         let WorkerScratch { frame, planes, moments, strips, simple_strips, half_windows, .. } =
             scratch;

@@ -6,8 +6,7 @@ use super::planes::{Corners, Frame, MARGIN, Planes, grow, sum_between};
 use super::tile::{Found, Sums};
 use crate::cloud::Points;
 use crate::paper::{ROUNDING, refill};
-use crate::simd::twice::Twice;
-use crate::simd::{GROUP, Simd};
+use crate::simd::{GROUP, Groups, Simd};
 use crate::window::Image;
 
 /// x, y, z, xx, xy, xz, yy, yz, zz
@@ -64,8 +63,12 @@ pub(crate) fn sum_of_moments(points: impl Iterator<Item = [f64; 3]>) -> ([f64; C
     (sums, count)
 }
 
-/// Newton steps for the eigenvalue: one or two are usual, a few more where two eigenvalues are near.
+/// Newton steps for the eigenvalue: one is usual, a few more where two eigenvalues are near.
 const STEPS: usize = 8;
+
+/// cos(2/3 acos(x)) from 0 to 1, within 2e-7: a polynomial, the highest power first.
+const COSINES: [f32; 7] =
+    [-0.0021035, 0.0105018, -0.0263997, 0.0514748, -0.1108055, 0.5773319, 0.5000002];
 
 /// The step from which on one more changes the normal by less than 1e-6.
 const CONVERGED: f32 = 1e-3;
@@ -86,7 +89,7 @@ impl Moments {
 }
 
 impl Sums for Moments {
-    type Of8<S: Simd> = WindowMoments<Doubles<S>>;
+    type OfLanes<S: Simd> = WindowMoments<Doubles<S>>;
     type Of1 = WindowMoments<f64>;
 
     const COLUMN: usize = CHANNELS * size_of::<f64>();
@@ -107,7 +110,7 @@ impl Sums for Moments {
     }
 
     #[inline(always)]
-    unsafe fn push<S: Simd>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
+    unsafe fn push<S: Groups>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
         let place = frame.place(y);
         let groups = frame.groups() + 1;
         let (stride, plane) = (frame.stride, 3 * frame.stride);
@@ -152,13 +155,13 @@ impl Sums for Moments {
     }
 
     #[inline(always)]
-    unsafe fn of_group<S: Simd>(
+    unsafe fn of_pixels<S: Simd>(
         &self,
         frame: &Frame,
         _planes: &Planes,
         x: usize,
         side: usize,
-    ) -> Self::Of8<S> {
+    ) -> Self::OfLanes<S> {
         let (corners, share) = &self.places[side];
         let x = frame.column(x);
         // SAFETY: as the caller's: rows and columns are held, and so are the groups from these columns on.
@@ -173,7 +176,11 @@ impl Sums for Moments {
     }
 
     #[inline(always)]
-    unsafe fn select<S: Simd>(lanes: u32, yes: Self::Of8<S>, no: Self::Of8<S>) -> Self::Of8<S> {
+    unsafe fn select<S: Simd>(
+        lanes: u32,
+        yes: Self::OfLanes<S>,
+        no: Self::OfLanes<S>,
+    ) -> Self::OfLanes<S> {
         let mut moments = no;
         // SAFETY: as the caller's.
         unsafe {
@@ -187,8 +194,12 @@ impl Sums for Moments {
     }
 
     #[inline(always)]
-    fn pair<S: Simd>(first: Self::Of8<S>, second: Self::Of8<S>) -> Self::Of8<Twice<S>> {
-        let both = |a: Doubles<S>, b: Doubles<S>| Doubles([a.0, b.0]);
+    fn pair<S: Groups>(
+        first: Self::OfLanes<S>,
+        second: Self::OfLanes<S>,
+    ) -> Self::OfLanes<S::Pair> {
+        // SAFETY: there are groups, so there is the instruction set.
+        let both = |a: Doubles<S>, b: Doubles<S>| Doubles(unsafe { S::pair_d(a.0, b.0) });
         let mut sums = [both(first.sums[0], second.sums[0]); CHANNELS];
         for c in 1..CHANNELS {
             sums[c] = both(first.sums[c], second.sums[c]);
@@ -197,7 +208,7 @@ impl Sums for Moments {
     }
 
     #[inline(always)]
-    unsafe fn none<S: Simd>() -> Self::Of8<S> {
+    unsafe fn none<S: Simd>() -> Self::OfLanes<S> {
         // SAFETY: as the caller's.
         let zero = unsafe { Doubles::splat(0.0) };
         WindowMoments { sums: [zero; CHANNELS], share: zero }
@@ -234,7 +245,7 @@ impl Sums for Moments {
     }
 
     #[inline(always)]
-    unsafe fn put<S: Simd>(moments: &mut Self::Of8<S>, lane: usize, one: Self::Of1) {
+    unsafe fn put<S: Simd>(moments: &mut Self::OfLanes<S>, lane: usize, one: Self::Of1) {
         // SAFETY: as the caller's.
         unsafe {
             for (to, one) in moments.sums.iter_mut().zip(one.sums) {
@@ -263,7 +274,7 @@ impl Sums for Moments {
     unsafe fn estimate<S: Simd>(
         &self,
         _frame: &Frame,
-        moments: &Self::Of8<S>,
+        moments: &Self::OfLanes<S>,
         _sides: S::F,
         lanes: u32,
         fresh: u32,
@@ -273,8 +284,8 @@ impl Sums for Moments {
     }
 }
 
-/// The eigenvector of the smallest eigenvalue: the least root of the characteristic polynomial by one step of
-/// Laguerre's method from 0 and Newton steps, then a column of the adjugate. `error` is what the rounding errors of
+/// The eigenvector of the smallest eigenvalue: the least root of the characteristic polynomial in closed form, made
+/// precise by Newton steps, then a column of the adjugate. `error` is what the rounding errors of
 /// the sums of all but `fresh` lanes stay below; other lanes than `lanes` mean nothing.
 ///
 /// # Safety
@@ -303,12 +314,7 @@ pub(crate) unsafe fn plane<S: Simd>(
         let c2 = xx + yy + zz;
         let c1 = minor_x + minor_y + minor_z;
         let c0 = xx * minor_x + xy * (xz * yz - xy * zz) + xz * (xy * yz - xz * yy);
-        let mut value = {
-            let (c0, c1, c2) = (c0.narrow(), c1.narrow(), c2.narrow());
-            let square = Floats::splat(4.0) * c1 * c1 - Floats::splat(12.0) * c0 * c2;
-            let root = square.max(Floats::splat(0.0)).sqrt();
-            (Floats::splat(3.0) * c0 / (c1 + root)).widen()
-        };
+        let mut value = least_root([c0.narrow(), c1.narrow(), c2.narrow()]).widen();
         let twice = c2 + c2;
         let (three, converged) = (Doubles::splat(3.0), Floats::splat(CONVERGED));
         let (mut slope, mut unsettled) = (Floats::splat(0.0), lanes);
@@ -354,12 +360,33 @@ pub(crate) unsafe fn plane<S: Simd>(
     }
 }
 
+/// The least root of value^3 - c2 value^2 + c1 value - c0, whose roots are real, by Viete's formula.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn least_root<S: Simd>([c0, c1, c2]: [Floats<S>; 3]) -> Floats<S> {
+    // SAFETY: as the caller's.
+    unsafe {
+        let splat = |value| Floats::<S>::splat(value);
+        let square = (c2 * c2 - splat(3.0) * c1).max(splat(0.0));
+        let radius = square.sqrt();
+        let cube = square * radius;
+        let q = (c2 * c2 - splat(4.5) * c1) * c2 + splat(13.5) * c0;
+        // The angle a of the formula has the cosine q / cube; this is the sine of its half.
+        let sine = (splat(0.5) * (cube - q) / cube).max(splat(0.0)).sqrt();
+        let [first, others @ ..] = COSINES;
+        let cosine = others.into_iter().fold(splat(first), |sum, c| sum * sine + splat(c));
+        (c2 - splat(2.0) * radius * cosine) * splat(1.0 / 3.0)
+    }
+}
+
 /// One plane of an integral row (Eq. 2) of the products of `FACTORS` rows.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`; the groups are inside the rows, and in the planes after the margin.
 #[inline(always)]
-unsafe fn integrate<S: Simd, const FACTORS: usize>(
+unsafe fn integrate<S: Groups, const FACTORS: usize>(
     factors: [*const f64; FACTORS],
     above: *const f64,
     row: *mut f64,

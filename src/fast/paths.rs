@@ -1,10 +1,13 @@
 //! The outermost functions, each compiled for its instruction set.
 
 use crate::isa::Isa;
-use crate::simd::Simd;
+use crate::simd::Groups;
 use crate::simd::portable::Portable;
 #[cfg(target_arch = "x86_64")]
-use crate::simd::x86::{Avx2, Sse2};
+use crate::simd::{
+    avx512::Avx512,
+    x86::{Avx2, Sse2},
+};
 
 /// Work that is compiled for every instruction set; `run` is `#[inline(always)]`.
 pub(super) trait Task {
@@ -12,17 +15,17 @@ pub(super) trait Task {
 
     /// # Safety
     /// The processor has the instruction set of `S`, and what the task asks for.
-    unsafe fn run<S: Simd>(self) -> Self::Output;
+    unsafe fn run<S: Groups>(self) -> Self::Output;
 }
 
 macro_rules! path {
-    ($name:ident, $simd:ty $(, $feature:literal)?) => {
+    ($name:ident, $groups:ty $(, $feature:literal)?) => {
         /// # Safety
         /// The processor has this instruction set, and what the task asks for.
         $(#[target_feature(enable = $feature)])?
         unsafe fn $name<T: Task>(task: T) -> T::Output {
             // SAFETY: as the caller's.
-            unsafe { task.run::<$simd>() }
+            unsafe { task.run::<$groups>() }
         }
     };
 }
@@ -33,7 +36,7 @@ path!(sse2, Sse2);
 #[cfg(target_arch = "x86_64")]
 path!(avx2, Avx2, "avx2");
 #[cfg(target_arch = "x86_64")]
-path!(avx512, Avx2, "avx2,avx512f,avx512vl,avx512dq,avx512bw");
+path!(avx512, Avx512, "avx2,avx512f,avx512vl,avx512dq,avx512bw");
 #[cfg(target_arch = "aarch64")]
 path!(neon, crate::simd::neon::Neon, "neon");
 

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::arithmetic::Doubles;
 use crate::cloud::Points;
-use crate::simd::{GROUP, Simd};
+use crate::simd::{GROUP, Groups, Simd};
 
 /// Columns before and after a row's own, so that groups and the column before the first need no special case.
 pub(crate) const MARGIN: usize = GROUP;
@@ -142,7 +142,7 @@ impl Planes {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn push<S: Simd>(
+    pub unsafe fn push<S: Groups>(
         &mut self,
         points: &Points,
         frame: &Frame,

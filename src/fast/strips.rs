@@ -9,8 +9,7 @@ use super::arithmetic::{Floats, cross, dot};
 use super::planes::{Corners, Frame, MARGIN, Planes, grow};
 use super::tile::{Found, Sums};
 use crate::paper::refill;
-use crate::simd::twice::Twice;
-use crate::simd::{GROUP, Simd};
+use crate::simd::{GROUP, Groups, Simd};
 use crate::window::Image;
 
 /// The rings of AVERAGE_3D_GRADIENT (`SIMPLE` false), whose strips are pairs of columns and of rows, or of
@@ -52,7 +51,7 @@ impl<const SIMPLE: bool> Strips<SIMPLE> {
 }
 
 impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
-    type Of8<S: Simd> = Gradients<S::I>;
+    type OfLanes<S: Simd> = Gradients<S::I>;
     type Of1 = Gradients<i32>;
 
     const COLUMN: usize = 6 * size_of::<i32>();
@@ -79,7 +78,7 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     }
 
     #[inline(always)]
-    unsafe fn push<S: Simd>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
+    unsafe fn push<S: Groups>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
         std::mem::swap(&mut self.last, &mut self.above);
         let groups = frame.groups() + 1; // the strips' groups may reach one further
         for c in 0..3 {
@@ -131,13 +130,13 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     }
 
     #[inline(always)]
-    unsafe fn of_group<S: Simd>(
+    unsafe fn of_pixels<S: Simd>(
         &self,
         frame: &Frame,
         _planes: &Planes,
         x: usize,
         side: usize,
-    ) -> Self::Of8<S> {
+    ) -> Self::OfLanes<S> {
         let [columns, rows] = &self.places[side];
         let x = frame.column(x);
         // SAFETY: as the caller's: rows and columns are held, and so are the groups from these columns on.
@@ -153,7 +152,11 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     }
 
     #[inline(always)]
-    unsafe fn select<S: Simd>(lanes: u32, yes: Self::Of8<S>, no: Self::Of8<S>) -> Self::Of8<S> {
+    unsafe fn select<S: Simd>(
+        lanes: u32,
+        yes: Self::OfLanes<S>,
+        no: Self::OfLanes<S>,
+    ) -> Self::OfLanes<S> {
         let mut sums = no;
         for g in 0..2 {
             for c in 0..3 {
@@ -165,14 +168,19 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     }
 
     #[inline(always)]
-    fn pair<S: Simd>(first: Self::Of8<S>, second: Self::Of8<S>) -> Self::Of8<Twice<S>> {
+    fn pair<S: Groups>(
+        first: Self::OfLanes<S>,
+        second: Self::OfLanes<S>,
+    ) -> Self::OfLanes<S::Pair> {
+        // SAFETY: there are groups, so there is the instruction set.
+        let both = |a, b| unsafe { S::pair_i(a, b) };
         let [[a, b, c], [d, e, f]] = first;
         let [[g, h, i], [j, k, l]] = second;
-        [[[a, g], [b, h], [c, i]], [[d, j], [e, k], [f, l]]]
+        [[both(a, g), both(b, h), both(c, i)], [both(d, j), both(e, k), both(f, l)]]
     }
 
     #[inline(always)]
-    unsafe fn none<S: Simd>() -> Self::Of8<S> {
+    unsafe fn none<S: Simd>() -> Self::OfLanes<S> {
         // SAFETY: as the caller's.
         [[unsafe { S::splat_i(0) }; 3]; 2]
     }
@@ -211,7 +219,7 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     }
 
     #[inline(always)]
-    unsafe fn put<S: Simd>(sums: &mut Self::Of8<S>, lane: usize, one: Self::Of1) {
+    unsafe fn put<S: Simd>(sums: &mut Self::OfLanes<S>, lane: usize, one: Self::Of1) {
         for g in 0..2 {
             for c in 0..3 {
                 // SAFETY: as the caller's.
@@ -224,7 +232,7 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     unsafe fn estimate<S: Simd>(
         &self,
         _frame: &Frame,
-        sums: &Self::Of8<S>,
+        sums: &Self::OfLanes<S>,
         sides: S::F,
         _lanes: u32,
         _fresh: u32,

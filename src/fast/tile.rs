@@ -10,11 +10,10 @@ use crate::cloud::Points;
 use crate::methods::{Estimate, estimate};
 use crate::options::{BorderPolicy, Options};
 use crate::orientation::turn_to_viewpoint;
-use crate::simd::twice::Twice;
-use crate::simd::{GROUP, Simd};
+use crate::simd::{GROUP, Groups, Simd};
 use crate::window::Image;
 
-/// What a method finds for eight pixels: normals of unit length, not yet turned, and curvatures.
+/// What a method finds for some pixels side by side: normals of unit length, not yet turned, and curvatures.
 pub(crate) struct Found<S: Simd> {
     pub normal: [Floats<S>; 3],
     pub curvature: Floats<S>,
@@ -24,8 +23,8 @@ pub(crate) struct Found<S: Simd> {
 
 /// A method's sums over windows, from rings of integral rows. Each method says what it keeps a ring of.
 pub(crate) trait Sums {
-    /// The sums of eight windows.
-    type Of8<S: Simd>: Copy;
+    /// The sums of as many windows as there are lanes.
+    type OfLanes<S: Simd>: Copy;
     /// The sums of one window.
     type Of1;
 
@@ -45,30 +44,34 @@ pub(crate) trait Sums {
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
-    unsafe fn push<S: Simd>(&mut self, frame: &Frame, planes: &Planes, y: usize);
+    unsafe fn push<S: Groups>(&mut self, frame: &Frame, planes: &Planes, y: usize);
 
     /// Finds where in the rings the corners of windows of up to `side` around the pixels of row `y` are: groups ask
     /// for the same ones again and again.
     fn aim(&mut self, frame: &Frame, y: usize, side: usize);
 
-    /// The sums of the windows of `side` x `side` around the eight pixels from `x` on of the row aimed at. The
-    /// windows, and the pixels around them, lie inside the image and hold finite points only.
+    /// The sums of the windows of `side` x `side` around the pixels from `x` on, one in each lane, of the row aimed
+    /// at. The windows, and the pixels around them, lie inside the image and hold finite points only.
     ///
     /// # Safety
     /// As [`Sums::push`]; the rings hold the rows and columns of the windows.
-    unsafe fn of_group<S: Simd>(
+    unsafe fn of_pixels<S: Simd>(
         &self,
         frame: &Frame,
         planes: &Planes,
         x: usize,
         side: usize,
-    ) -> Self::Of8<S>;
+    ) -> Self::OfLanes<S>;
 
     /// `mask ? yes : no`
     ///
     /// # Safety
     /// As [`Sums::push`].
-    unsafe fn select<S: Simd>(lanes: u32, yes: Self::Of8<S>, no: Self::Of8<S>) -> Self::Of8<S>;
+    unsafe fn select<S: Simd>(
+        lanes: u32,
+        yes: Self::OfLanes<S>,
+        no: Self::OfLanes<S>,
+    ) -> Self::OfLanes<S>;
 
     /// The sums of one window that crosses the border of the image and is mirrored there; none if this method
     /// leaves such windows to the plain form.
@@ -82,19 +85,20 @@ pub(crate) trait Sums {
     ) -> Option<Self::Of1>;
 
     /// Two groups' sums.
-    fn pair<S: Simd>(first: Self::Of8<S>, second: Self::Of8<S>) -> Self::Of8<Twice<S>>;
+    fn pair<S: Groups>(first: Self::OfLanes<S>, second: Self::OfLanes<S>)
+    -> Self::OfLanes<S::Pair>;
 
     /// Sums to put lanes into.
     ///
     /// # Safety
     /// As [`Sums::push`].
-    unsafe fn none<S: Simd>() -> Self::Of8<S>;
+    unsafe fn none<S: Simd>() -> Self::OfLanes<S>;
 
     /// Replaces one lane.
     ///
     /// # Safety
     /// As [`Sums::push`].
-    unsafe fn put<S: Simd>(sums: &mut Self::Of8<S>, lane: usize, one: Self::Of1);
+    unsafe fn put<S: Simd>(sums: &mut Self::OfLanes<S>, lane: usize, one: Self::Of1);
 
     /// The sums of one window from its points, without the rings' rounding; none if that is left to the plain form.
     fn afresh(
@@ -115,7 +119,7 @@ pub(crate) trait Sums {
     unsafe fn estimate<S: Simd>(
         &self,
         frame: &Frame,
-        sums: &Self::Of8<S>,
+        sums: &Self::OfLanes<S>,
         sides: S::F,
         lanes: u32,
         fresh: u32,
@@ -144,7 +148,7 @@ impl Tile<'_> {
     /// # Safety
     /// The processor has the instruction set of `S`; the sink's pixels of this tile are written by no one else.
     #[inline(always)]
-    pub unsafe fn compute<'r, S: Simd, M: Sums>(
+    pub unsafe fn compute<'r, S: Groups, M: Sums>(
         &self,
         frame: &mut Frame,
         planes: &mut Planes,
@@ -202,7 +206,7 @@ impl Tile<'_> {
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn largest_side<'r, S: Simd>(&self, sides: &impl Fn(usize) -> &'r [f32]) -> usize {
+    unsafe fn largest_side<'r, S: Groups>(&self, sides: &impl Fn(usize) -> &'r [f32]) -> usize {
         // SAFETY: as the caller's; a row of sides is readable up to a whole group, and other pixels' sides do no harm.
         unsafe {
             let mut largest = S::splat(0.0);
@@ -239,7 +243,7 @@ impl Tile<'_> {
     /// As [`Tile::compute`].
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    unsafe fn row<'r, S: Simd, M: Sums>(
+    unsafe fn row<'r, S: Groups, M: Sums>(
         &self,
         frame: &Frame,
         planes: &Planes,
@@ -269,14 +273,11 @@ impl Tile<'_> {
                     }
                     continue;
                 }
-                let first = self.group::<S, M>(frame, planes, sums, sides, &pair[0]);
-                let second = self.group::<S, M>(frame, planes, sums, sides, &pair[1]);
-                let group_sides = [pair[0].sides, pair[1].sides];
-                let mut of16 = M::pair::<S>(first.0, second.0);
-                let left = first.1 | second.1 << GROUP;
+                let (mut of16, left) = self.pair::<S, M>(frame, planes, sums, sides, &pair);
+                let group_sides = S::pair(pair[0].sides, pair[1].sides);
                 let (mut fresh, lanes) = (0, windows & !left);
                 let found = loop {
-                    let found = sums.estimate::<Twice<S>>(frame, &of16, group_sides, lanes, fresh);
+                    let found = sums.estimate::<S::Pair>(frame, &of16, group_sides, lanes, fresh);
                     let again = found.doubtful & lanes & !fresh;
                     let tried = self.afresh::<S, M>(&mut of16, row, pair[0].x, y, again);
                     if tried == 0 {
@@ -285,6 +286,8 @@ impl Tile<'_> {
                     fresh |= tried;
                 };
                 let plain = left | found.doubtful & windows;
+                let normals = found.normal.map(|c| S::groups(c.0));
+                let curvatures = S::groups(found.curvature.0);
                 for g in 0..2 {
                     let group = &pair[g];
                     let plain = plain >> (g * GROUP) & 0xff;
@@ -298,12 +301,8 @@ impl Tile<'_> {
                         Floats::load(planes_row[1].as_ptr().add(column)),
                         Floats::load(planes_row[2].as_ptr().add(column)),
                     ];
-                    let normal = [
-                        Floats(found.normal[0].0[g]),
-                        Floats(found.normal[1].0[g]),
-                        Floats(found.normal[2].0[g]),
-                    ];
-                    let curvature = Floats(found.curvature.0[g]);
+                    let normal = normals.map(|c| Floats(c[g]));
+                    let curvature = Floats(curvatures[g]);
                     let sure = group.windows & !plain;
                     let mut normals = Octet::of::<S>(normal, curvature, point, viewpoint, sure);
                     if plain != 0 {
@@ -320,9 +319,9 @@ impl Tile<'_> {
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn afresh<S: Simd, M: Sums>(
+    unsafe fn afresh<S: Groups, M: Sums>(
         &self,
-        of16: &mut M::Of8<Twice<S>>,
+        of16: &mut M::OfLanes<S::Pair>,
         sides: &[f32],
         x: usize,
         y: usize,
@@ -333,7 +332,7 @@ impl Tile<'_> {
             let side = sides[x + lane] as usize;
             if let Some(one) = M::afresh(self.points, self.image, (x + lane, y), side) {
                 // SAFETY: as the caller's.
-                unsafe { M::put::<Twice<S>>(of16, lane, one) };
+                unsafe { M::put::<S::Pair>(of16, lane, one) };
                 tried |= 1 << lane;
             }
         }
@@ -345,7 +344,7 @@ impl Tile<'_> {
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn without_sums<S: Simd>(&self, sink: &Sink, group: &Group<S>) {
+    unsafe fn without_sums<S: Groups>(&self, sink: &Sink, group: &Group<S>) {
         // SAFETY: as the caller's.
         unsafe {
             if group.windows == 0 {
@@ -360,7 +359,7 @@ impl Tile<'_> {
 
     /// The normals of some of a group's lanes by the plain form.
     #[cold]
-    fn plain_lanes<S: Simd>(&self, normals: &mut Octet, group: &Group<S>, lanes: u32) {
+    fn plain_lanes<S: Groups>(&self, normals: &mut Octet, group: &Group<S>, lanes: u32) {
         for lane in Bits(lanes) {
             let pixel = (group.x + lane, group.y);
             let side = group.row[pixel.0] as usize;
@@ -371,19 +370,46 @@ impl Tile<'_> {
         }
     }
 
+    /// The sums of the windows of two groups side by side, and the lanes whose windows are left to the plain form.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn pair<'r, S: Groups, M: Sums>(
+        &self,
+        frame: &Frame,
+        planes: &Planes,
+        sums: &M,
+        sides: &impl Fn(usize) -> &'r [f32],
+        groups: &[Group<S>; 2],
+    ) -> (M::OfLanes<S::Pair>, u32) {
+        let [first, second] = groups;
+        // SAFETY: as the caller's; the frame holds the largest side around every pixel of the tile.
+        unsafe {
+            if let (Some(side), Some(other)) = (first.one_side(), second.one_side())
+                && side == other
+            {
+                return (sums.of_pixels::<S::Pair>(frame, planes, first.x, side), 0);
+            }
+            let first = self.group::<S, M>(frame, planes, sums, sides, first);
+            let second = self.group::<S, M>(frame, planes, sums, sides, second);
+            (M::pair::<S>(first.0, second.0), first.1 | second.1 << GROUP)
+        }
+    }
+
     /// The sums of a group's windows, and the lanes whose windows are left to the plain form.
     ///
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn group<'r, S: Simd, M: Sums>(
+    unsafe fn group<'r, S: Groups, M: Sums>(
         &self,
         frame: &Frame,
         planes: &Planes,
         sums: &M,
         sides: &impl Fn(usize) -> &'r [f32],
         group: &Group<S>,
-    ) -> (M::Of8<S>, u32) {
+    ) -> (M::OfLanes<S>, u32) {
         let (mut plain, mut todo) = (0, group.windows);
         // SAFETY: as the caller's; the frame holds the largest side around every pixel of the tile.
         unsafe {
@@ -393,7 +419,7 @@ impl Tile<'_> {
             let (same, side) = group.next_windows(todo);
             todo &= !same;
             let mut of8 = if self.is_inside(group, same, side) {
-                sums.of_group::<S>(frame, planes, group.x, side)
+                sums.of_pixels::<S>(frame, planes, group.x, side)
             } else {
                 let mut of8 = M::none::<S>();
                 plain |= self
@@ -404,7 +430,7 @@ impl Tile<'_> {
                 let (same, side) = group.next_windows(todo);
                 todo &= !same;
                 if self.is_inside(group, same, side) {
-                    let these = sums.of_group::<S>(frame, planes, group.x, side);
+                    let these = sums.of_pixels::<S>(frame, planes, group.x, side);
                     of8 = M::select::<S>(same, these, of8);
                 } else {
                     plain |= self.put_crossing::<S, M>(
@@ -428,7 +454,7 @@ impl Tile<'_> {
 
     /// Whether the windows of some lanes, and the pixels around them, are inside the image.
     #[inline(always)]
-    fn is_inside<S: Simd>(&self, group: &Group<S>, lanes: u32, side: usize) -> bool {
+    fn is_inside<S: Groups>(&self, group: &Group<S>, lanes: u32, side: usize) -> bool {
         if group.inner {
             return true;
         }
@@ -443,7 +469,7 @@ impl Tile<'_> {
     /// As [`Tile::compute`].
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    unsafe fn put_crossing<'r, S: Simd, M: Sums>(
+    unsafe fn put_crossing<'r, S: Groups, M: Sums>(
         &self,
         frame: &Frame,
         planes: &Planes,
@@ -452,7 +478,7 @@ impl Tile<'_> {
         group: &Group<S>,
         lanes: u32,
         side: usize,
-        of8: &mut M::Of8<S>,
+        of8: &mut M::OfLanes<S>,
     ) -> u32 {
         let pixel = (group.x, group.y);
         let ones = self.crossing(frame, planes, sums, sides, pixel, lanes, side);
@@ -523,7 +549,7 @@ fn contains(range: &Range<usize>, other: RangeInclusive<usize>) -> bool {
 }
 
 /// Eight pixels of a row and their windows.
-struct Group<'a, S: Simd> {
+struct Group<'a, S: Groups> {
     /// The first pixel.
     x: usize,
     y: usize,
@@ -538,7 +564,7 @@ struct Group<'a, S: Simd> {
     inner: bool,
 }
 
-impl<'a, S: Simd> Group<'a, S> {
+impl<'a, S: Groups> Group<'a, S> {
     /// # Safety
     /// The processor has the instruction set of `S`; the row is readable from `x` up to a whole group.
     #[inline(always)]
@@ -551,6 +577,20 @@ impl<'a, S: Simd> Group<'a, S> {
             let inner = contains(inner, x..=x + GROUP - 1);
             Group { x, y, row, sides, count, windows, inner }
         }
+    }
+
+    /// The side of all its windows, if they have the same and are inside the image.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn one_side(&self) -> Option<usize> {
+        if self.windows == 0 || !self.inner {
+            return None;
+        }
+        // SAFETY: as the caller's.
+        let (same, side) = unsafe { self.next_windows(self.windows) };
+        (same == self.windows).then_some(side)
     }
 
     /// The first of the lanes `todo` and those with windows of the same side; and that side.
@@ -608,7 +648,7 @@ impl Octet {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn of<S: Simd>(
+    pub unsafe fn of<S: Groups>(
         normal: [Floats<S>; 3],
         curvature: Floats<S>,
         point: [Floats<S>; 3],

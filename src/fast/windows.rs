@@ -107,7 +107,7 @@ impl<'a> WindowRows<'a> {
     /// magnitude of a finite depth in them.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`.
+    /// The processor has the instruction set of `S`, which has sixteen lanes.
     #[inline(always)]
     pub unsafe fn sweep_down<S: Simd>(
         &mut self,
@@ -153,7 +153,7 @@ impl<'a> WindowRows<'a> {
     /// hold the sides of their windows.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`.
+    /// The processor has the instruction set of `S`, which has sixteen lanes.
     #[inline(always)]
     pub unsafe fn sweep_up<S: Simd>(
         &mut self,
@@ -201,7 +201,7 @@ impl Sweep {
     /// elsewhere. Keeps the changes to the row below for the next row, and the largest magnitudes of finite depths.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`.
+    /// The processor has the instruction set of `S`, which has sixteen lanes.
     #[inline(always)]
     unsafe fn start_row<S: Simd>(
         &mut self,
@@ -224,36 +224,28 @@ impl Sweep {
             let mut most = largest.load::<S>();
             let end = z[segment - 1].load::<S>();
             let end_right = z[segment].load::<S>();
+            let bound = threshold::<S>(end, factor);
+            let change = is_change::<S>(end, S::finite(end), end_right, bound);
             let mut ends = Lanes::ZERO;
-            for g in 0..2 {
-                let bound = threshold::<S>(end[g], factor);
-                let change = is_change::<S>(end[g], S::finite(end[g]), end_right[g], bound);
-                let tested = tested[segment - 1].load::<S>();
-                ends.store_group::<S>(g, S::and(change, tested[g]));
-            }
+            ends.store::<S>(S::and(change, tested[segment - 1].load::<S>()));
             let mut left = ends.next_lane(0.0).load::<S>();
             let mut own = z[0].load::<S>();
             for k in 0..segment {
                 let right = z[k + 1].load::<S>();
                 let (lower, upper) = (below[k].load::<S>(), above[k].load::<S>());
                 let tested = tested[k].load::<S>();
-                for g in 0..2 {
-                    let finite = S::finite(own[g]);
-                    most[g] = S::max(S::and(finite, S::abs(own[g])), most[g]);
-                    let bound = threshold::<S>(own[g], factor);
-                    let to_right =
-                        S::and(is_change::<S>(own[g], finite, right[g], bound), tested[g]);
-                    let to_lower =
-                        S::and(is_change::<S>(own[g], finite, lower[g], bound), tested[g]);
-                    let change = S::or(S::or(to_right, left[g]), S::or(to_lower, upper[g]));
-                    row[k].store_group::<S>(g, S::and_not(change, far));
-                    above[k].store_group::<S>(g, to_lower);
-                    left[g] = to_right;
-                }
+                let finite = S::finite(own);
+                most = S::max(S::and(finite, S::abs(own)), most);
+                let bound = threshold::<S>(own, factor);
+                let to_right = S::and(is_change::<S>(own, finite, right, bound), tested);
+                let to_lower = S::and(is_change::<S>(own, finite, lower, bound), tested);
+                let change = S::or(S::or(to_right, left), S::or(to_lower, upper));
+                row[k].store::<S>(S::and_not(change, far));
+                above[k].store::<S>(to_lower);
+                left = to_right;
                 own = right;
             }
-            largest.store_group::<S>(0, most[0]);
-            largest.store_group::<S>(1, most[1]);
+            largest.store::<S>(most);
         }
     }
 
@@ -276,13 +268,10 @@ impl Sweep {
             let mut most = largest.load::<S>();
             for k in 0..order.segment {
                 let (above, own) = (self.above[k].load::<S>(), z[k].load::<S>());
-                for g in 0..2 {
-                    row[k].store_group::<S>(g, S::and_not(above[g], S::splat(far)));
-                    most[g] = S::max(S::and(S::finite(own[g]), S::abs(own[g])), most[g]);
-                }
+                row[k].store::<S>(S::and_not(above, S::splat(far)));
+                most = S::max(S::and(S::finite(own), S::abs(own)), most);
             }
-            largest.store_group::<S>(0, most[0]);
-            largest.store_group::<S>(1, most[1]);
+            largest.store::<S>(most);
         }
     }
 
@@ -314,15 +303,12 @@ impl Sweep {
             for k in 0..segment {
                 let distances = distances[k].load::<S>();
                 let z = z[k].load::<S>();
-                let smoothing = |g: usize| {
-                    if options.depth_dependent_smoothing {
-                        S::add(size, S::div(z[g], ten))
-                    } else {
-                        size
-                    }
+                let smoothing = if options.depth_dependent_smoothing {
+                    S::add(size, S::div(z, ten))
+                } else {
+                    size
                 };
-                sides[k].store_group::<S>(0, side(distances[0], smoothing(0)));
-                sides[k].store_group::<S>(1, side(distances[1], smoothing(1)));
+                sides[k].store::<S>(side(distances, smoothing));
             }
         }
         let row = floats_mut(row);
@@ -375,17 +361,13 @@ fn close_ends(row: &mut [Lanes], far: f32) {
 
 /// The least of what an element's three neighbours in the next row over give, and its own value.
 #[inline(always)]
-unsafe fn nearest<S: Simd>(own: &Lanes, over: &[Lanes; 3]) -> [S::F; 2] {
+unsafe fn nearest<S: Simd>(own: &Lanes, over: &[Lanes; 3]) -> S::F {
     // SAFETY: as the caller's.
     unsafe {
         let (straight, diagonal) = (S::splat(STRAIGHT), S::splat(DIAGONAL));
-        let own = own.load::<S>();
         let [a, b, c] = [over[0].load::<S>(), over[1].load::<S>(), over[2].load::<S>()];
-        let least = |g: usize| {
-            let diagonals = S::min(S::add(a[g], diagonal), S::add(c[g], diagonal));
-            S::min(S::min(own[g], S::add(b[g], straight)), diagonals)
-        };
-        [least(0), least(1)]
+        let diagonals = S::min(S::add(a, diagonal), S::add(c, diagonal));
+        S::min(S::min(own.load::<S>(), S::add(b, straight)), diagonals)
     }
 }
 
@@ -397,15 +379,9 @@ fn three(over: &[Lanes], at: usize) -> &[Lanes; 3] {
 
 /// The step along the row.
 #[inline(always)]
-unsafe fn along<S: Simd>(nearest: [S::F; 2], before: [S::F; 2]) -> [S::F; 2] {
+unsafe fn along<S: Simd>(nearest: S::F, before: S::F) -> S::F {
     // SAFETY: as the caller's.
-    unsafe {
-        let straight = S::splat(STRAIGHT);
-        [
-            S::min(nearest[0], S::add(before[0], straight)),
-            S::min(nearest[1], S::add(before[1], straight)),
-        ]
-    }
+    unsafe { S::min(nearest, S::add(before, S::splat(STRAIGHT))) }
 }
 
 /// The forward pass over one row; `above` is done.
@@ -420,14 +396,12 @@ unsafe fn forward<S: Simd>(order: LaneOrder, above: &[Lanes], row: &mut [Lanes])
     // SAFETY: as the caller's.
     unsafe {
         let start = nearest::<S>(&row[1], three(above, 1));
-        row[1].store_group::<S>(0, start[0]);
-        row[1].store_group::<S>(1, start[1]);
+        row[1].store::<S>(start);
         row[1].0[0] = first; // column 0 stays
         let mut left = row[1].load::<S>();
         for at in 2..=segment {
             left = along::<S>(nearest::<S>(&row[at], three(above, at)), left);
-            row[at].store_group::<S>(0, left[0]);
-            row[at].store_group::<S>(1, left[1]);
+            row[at].store::<S>(left);
         }
     }
     for lane in 1..LANES {
@@ -449,18 +423,16 @@ unsafe fn backward<S: Simd>(order: LaneOrder, row: &mut [Lanes], below: &[Lanes]
     let last = row[last_element + 1].0[last_lane];
     // SAFETY: as the caller's.
     unsafe {
-        let mut right = [S::splat(far); 2];
+        let mut right = S::splat(far);
         for at in (last_element + 1..=segment).rev() {
             right = along::<S>(nearest::<S>(&row[at], three(below, at)), right);
-            row[at].store_group::<S>(0, right[0]);
-            row[at].store_group::<S>(1, right[1]);
+            row[at].store::<S>(right);
         }
         row[last_element + 1].0[last_lane] = last; // the last column stays
         right = row[last_element + 1].load::<S>();
         for at in (1..=last_element).rev() {
             right = along::<S>(nearest::<S>(&row[at], three(below, at)), right);
-            row[at].store_group::<S>(0, right[0]);
-            row[at].store_group::<S>(1, right[1]);
+            row[at].store::<S>(right);
         }
     }
     for lane in (0..last_lane).rev() {
@@ -495,7 +467,7 @@ mod tests {
     use super::*;
     use crate::depth_change::depth_change_map;
     use crate::distance::distance_map;
-    use crate::simd::portable::Portable;
+    use crate::simd::{portable::Portable, twice::Twice};
     use crate::smoothing_area::window_side;
 
     /// Depths with steps and holes, the same for the same seed.
@@ -537,8 +509,13 @@ mod tests {
                 let mut sweep = Sweep::default();
                 // SAFETY: the portable path runs everywhere.
                 unsafe {
-                    windows.sweep_down::<Portable>(&points, &options, (0, height), &mut sweep);
-                    windows.sweep_up::<Portable>(&points, &options, (0, height), &mut sweep);
+                    windows.sweep_down::<Twice<Portable>>(
+                        &points,
+                        &options,
+                        (0, height),
+                        &mut sweep,
+                    );
+                    windows.sweep_up::<Twice<Portable>>(&points, &options, (0, height), &mut sweep);
                 }
                 for y in 0..height {
                     for x in 0..width {

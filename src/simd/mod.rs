@@ -1,11 +1,15 @@
-//! Eight pixels at a time on every instruction set.
+//! Eight pixels at a time on every instruction set, or sixteen as pairs of eight.
 //!
 //! Algorithms are written once, over [`Simd`], in `#[inline(always)]` functions; only the outermost function of a
 //! path is compiled for its instruction set. No operation fuses or reorders, so every path gives the same bits.
 
 pub(crate) mod portable;
+#[cfg(test)]
+mod tests;
 pub(crate) mod twice;
 
+#[cfg(target_arch = "x86_64")]
+pub(crate) mod avx512;
 #[cfg(target_arch = "aarch64")]
 pub(crate) mod neon;
 #[cfg(target_arch = "x86_64")]
@@ -14,24 +18,23 @@ pub(crate) mod x86;
 /// Pixels in a group.
 pub(crate) const GROUP: usize = 8;
 
-/// Eight floats, integers or doubles and what can be done with them. Masks are floats whose bits are all ones or
-/// all zeros (doubles for [`Simd::D`]).
+/// Some lanes of floats, integers or doubles and what can be done with them: groups of eight, or pairs of groups.
+/// Masks are floats whose bits are all ones or all zeros.
 ///
 /// # Safety
 /// The methods may only be called where the processor has the implementor's instruction set: within a function
-/// that [`crate::isa`] dispatched to. Loads and stores are of eight elements, at any address aligned to one.
+/// that [`crate::isa`] dispatched to. Loads and stores are of all lanes, at any address aligned to one element.
 pub(crate) trait Simd: Copy {
-    /// Eight f32.
+    const LANES: usize;
+    /// So many f32.
     type F: Copy;
-    /// Eight i32.
+    /// So many i32.
     type I: Copy;
-    /// Eight f64.
+    /// So many f64.
     type D: Copy;
 
     unsafe fn splat(value: f32) -> Self::F;
     unsafe fn load(from: *const f32) -> Self::F;
-    /// Lanes 0 to 3 from one place, 4 to 7 from another.
-    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F;
     unsafe fn store(to: *mut f32, value: Self::F);
     unsafe fn add(a: Self::F, b: Self::F) -> Self::F;
     unsafe fn sub(a: Self::F, b: Self::F) -> Self::F;
@@ -53,18 +56,12 @@ pub(crate) trait Simd: Copy {
     unsafe fn and_not(mask: Self::F, a: Self::F) -> Self::F;
     /// Bit l is lane l of a mask.
     unsafe fn bits(mask: Self::F) -> u32;
-    /// Lane i of row j becomes lane j of row i, among lanes 0 to 3 and among lanes 4 to 7.
-    unsafe fn transpose_halves(rows: [Self::F; 4]) -> [Self::F; 4];
 
     unsafe fn load_i(from: *const i32) -> Self::I;
     unsafe fn store_i(to: *mut i32, value: Self::I);
     unsafe fn splat_i(value: i32) -> Self::I;
     unsafe fn add_i(a: Self::I, b: Self::I) -> Self::I;
     unsafe fn sub_i(a: Self::I, b: Self::I) -> Self::I;
-    /// Lane l becomes the sum of lanes 0 to l.
-    unsafe fn prefix_sum_i(a: Self::I) -> Self::I;
-    /// Every lane takes the value of the last one.
-    unsafe fn last_i(a: Self::I) -> Self::I;
     /// `lanes` bit l ? yes : no
     unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I;
     /// Nearest integers, ties to even; the value must fit.
@@ -75,8 +72,6 @@ pub(crate) trait Simd: Copy {
 
     unsafe fn splat_d(value: f64) -> Self::D;
     unsafe fn load_d(from: *const f64) -> Self::D;
-    /// Lanes 0 to 3 from one place, 4 to 7 from another.
-    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D;
     unsafe fn store_d(to: *mut f64, value: Self::D);
     unsafe fn add_d(a: Self::D, b: Self::D) -> Self::D;
     unsafe fn sub_d(a: Self::D, b: Self::D) -> Self::D;
@@ -87,39 +82,10 @@ pub(crate) trait Simd: Copy {
     unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32;
     /// `lanes` bit l ? yes : no
     unsafe fn select_bits_d(lanes: u32, yes: Self::D, no: Self::D) -> Self::D;
-    /// As [`Simd::transpose_halves`].
-    unsafe fn transpose_halves_d(rows: [Self::D; 4]) -> [Self::D; 4];
-    unsafe fn prefix_sum_d(a: Self::D) -> Self::D;
-    unsafe fn last_d(a: Self::D) -> Self::D;
     /// f32 to f64.
     unsafe fn widen(a: Self::F) -> Self::D;
     /// f64 to f32.
     unsafe fn narrow(a: Self::D) -> Self::F;
-
-    /// The prefix sums, going on from `carry`, which becomes the last one: it waits for one addition only, not for
-    /// the prefix sums.
-    #[inline(always)]
-    unsafe fn running_sum_i(a: Self::I, carry: &mut Self::I) -> Self::I {
-        // SAFETY: as the caller's.
-        unsafe {
-            let sum = Self::prefix_sum_i(a);
-            let running = Self::add_i(sum, *carry);
-            *carry = Self::add_i(Self::last_i(sum), *carry);
-            running
-        }
-    }
-
-    /// As [`Simd::running_sum_i`].
-    #[inline(always)]
-    unsafe fn running_sum_d(a: Self::D, carry: &mut Self::D) -> Self::D {
-        // SAFETY: as the caller's.
-        unsafe {
-            let sum = Self::prefix_sum_d(a);
-            let running = Self::add_d(sum, *carry);
-            *carry = Self::add_d(Self::last_d(sum), *carry);
-            running
-        }
-    }
 
     /// `mask ? yes : no`
     #[inline(always)]
@@ -151,8 +117,68 @@ pub(crate) trait Simd: Copy {
     /// The mask whose lane l is bit l.
     #[inline(always)]
     unsafe fn mask(bits: u32) -> Self::F {
+        const { assert!(Self::LANES == GROUP) };
         // SAFETY: as the caller's; a load of a whole group.
         unsafe { Self::load(MASKS[(bits & 0xff) as usize].0.as_ptr()) }
+    }
+}
+
+/// Groups of eight lanes, and what is done with them alone.
+///
+/// # Safety
+/// As [`Simd`].
+pub(crate) trait Groups: Simd {
+    /// Two groups side by side, the first one's lanes first: in wider registers, if there are any, else [`Twice`] as
+    /// many operations that do not wait for one another.
+    ///
+    /// [`Twice`]: twice::Twice
+    type Pair: Simd;
+
+    unsafe fn pair(first: Self::F, second: Self::F) -> <Self::Pair as Simd>::F;
+    unsafe fn pair_i(first: Self::I, second: Self::I) -> <Self::Pair as Simd>::I;
+    unsafe fn pair_d(first: Self::D, second: Self::D) -> <Self::Pair as Simd>::D;
+    /// Both groups.
+    unsafe fn groups(pair: <Self::Pair as Simd>::F) -> [Self::F; 2];
+
+    /// Lanes 0 to 3 from one place, 4 to 7 from another.
+    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F;
+    /// Lane i of row j becomes lane j of row i, among lanes 0 to 3 and among lanes 4 to 7.
+    unsafe fn transpose_halves(rows: [Self::F; 4]) -> [Self::F; 4];
+    /// Lanes 0 to 3 from one place, 4 to 7 from another.
+    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D;
+    /// As [`Groups::transpose_halves`].
+    unsafe fn transpose_halves_d(rows: [Self::D; 4]) -> [Self::D; 4];
+
+    /// Lane l becomes the sum of lanes 0 to l.
+    unsafe fn prefix_sum_i(a: Self::I) -> Self::I;
+    /// Every lane takes the value of the last one.
+    unsafe fn last_i(a: Self::I) -> Self::I;
+    unsafe fn prefix_sum_d(a: Self::D) -> Self::D;
+    unsafe fn last_d(a: Self::D) -> Self::D;
+
+    /// The prefix sums, going on from `carry`, which becomes the last one: it waits for one addition only, not for
+    /// the prefix sums.
+    #[inline(always)]
+    unsafe fn running_sum_i(a: Self::I, carry: &mut Self::I) -> Self::I {
+        // SAFETY: as the caller's.
+        unsafe {
+            let sum = Self::prefix_sum_i(a);
+            let running = Self::add_i(sum, *carry);
+            *carry = Self::add_i(Self::last_i(sum), *carry);
+            running
+        }
+    }
+
+    /// As [`Groups::running_sum_i`].
+    #[inline(always)]
+    unsafe fn running_sum_d(a: Self::D, carry: &mut Self::D) -> Self::D {
+        // SAFETY: as the caller's.
+        unsafe {
+            let sum = Self::prefix_sum_d(a);
+            let running = Self::add_d(sum, *carry);
+            *carry = Self::add_d(Self::last_d(sum), *carry);
+            running
+        }
     }
 }
 

@@ -5,7 +5,8 @@
 
 use std::arch::aarch64::*;
 
-use super::Simd;
+use super::twice::twice;
+use super::{GROUP, Groups, Simd};
 
 /// What every 64-bit Arm has.
 #[derive(Clone, Copy)]
@@ -63,6 +64,7 @@ unsafe fn each_mask(mask: [float32x4_t; 2]) -> [uint32x4_t; 2] {
 }
 
 impl Simd for Neon {
+    const LANES: usize = GROUP;
     type F = [float32x4_t; 2];
     type I = [int32x4_t; 2];
     type D = [float64x2_t; 4];
@@ -74,10 +76,6 @@ impl Simd for Neon {
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self::F {
         unsafe { [vld1q_f32(from), vld1q_f32(from.add(4))] }
-    }
-    #[inline(always)]
-    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {
-        unsafe { [vld1q_f32(low), vld1q_f32(high)] }
     }
     #[inline(always)]
     unsafe fn store(to: *mut f32, value: Self::F) {
@@ -163,25 +161,6 @@ impl Simd for Neon {
     }
 
     #[inline(always)]
-    unsafe fn transpose_halves(rows: [Self::F; 4]) -> [Self::F; 4] {
-        let [a, b, c, d] = rows;
-        let mut columns = rows;
-        for half in 0..2 {
-            unsafe {
-                let even = |a: float32x4_t, b: float32x4_t| vreinterpretq_f64_f32(vtrn1q_f32(a, b));
-                let odd = |a: float32x4_t, b: float32x4_t| vreinterpretq_f64_f32(vtrn2q_f32(a, b));
-                let (ab_even, cd_even) = (even(a[half], b[half]), even(c[half], d[half]));
-                let (ab_odd, cd_odd) = (odd(a[half], b[half]), odd(c[half], d[half]));
-                columns[0][half] = vreinterpretq_f32_f64(vtrn1q_f64(ab_even, cd_even));
-                columns[1][half] = vreinterpretq_f32_f64(vtrn1q_f64(ab_odd, cd_odd));
-                columns[2][half] = vreinterpretq_f32_f64(vtrn2q_f64(ab_even, cd_even));
-                columns[3][half] = vreinterpretq_f32_f64(vtrn2q_f64(ab_odd, cd_odd));
-            }
-        }
-        columns
-    }
-
-    #[inline(always)]
     unsafe fn load_i(from: *const i32) -> Self::I {
         unsafe { [vld1q_s32(from), vld1q_s32(from.add(4))] }
     }
@@ -203,25 +182,6 @@ impl Simd for Neon {
     #[inline(always)]
     unsafe fn sub_i(a: Self::I, b: Self::I) -> Self::I {
         unsafe { each!(vsubq_s32, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn prefix_sum_i(a: Self::I) -> Self::I {
-        #[inline(always)]
-        unsafe fn half(a: int32x4_t) -> int32x4_t {
-            unsafe {
-                let zero = vdupq_n_s32(0);
-                let a = vaddq_s32(a, vextq_s32::<3>(zero, a));
-                vaddq_s32(a, vextq_s32::<2>(zero, a))
-            }
-        }
-        unsafe {
-            let (low, high) = (half(a[0]), half(a[1]));
-            [low, vaddq_s32(high, vdupq_laneq_s32::<3>(low))]
-        }
-    }
-    #[inline(always)]
-    unsafe fn last_i(a: Self::I) -> Self::I {
-        unsafe { [vdupq_laneq_s32::<3>(a[1]); 2] }
     }
     #[inline(always)]
     unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
@@ -257,10 +217,6 @@ impl Simd for Neon {
                 vld1q_f64(from.add(6)),
             ]
         }
-    }
-    #[inline(always)]
-    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
-        unsafe { [vld1q_f64(low), vld1q_f64(low.add(2)), vld1q_f64(high), vld1q_f64(high.add(2))] }
     }
     #[inline(always)]
     unsafe fn store_d(to: *mut f64, value: Self::D) {
@@ -316,43 +272,6 @@ impl Simd for Neon {
         }
     }
     #[inline(always)]
-    unsafe fn transpose_halves_d(rows: [Self::D; 4]) -> [Self::D; 4] {
-        let [a, b, c, d] = rows;
-        let mut columns = rows;
-        for half in [0, 2] {
-            for i in 0..2 {
-                unsafe {
-                    columns[2 * i][half] = vtrn1q_f64(a[half + i], b[half + i]);
-                    columns[2 * i][half + 1] = vtrn1q_f64(c[half + i], d[half + i]);
-                    columns[2 * i + 1][half] = vtrn2q_f64(a[half + i], b[half + i]);
-                    columns[2 * i + 1][half + 1] = vtrn2q_f64(c[half + i], d[half + i]);
-                }
-            }
-        }
-        columns
-    }
-    #[inline(always)]
-    unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
-        /// Four lanes: each gets the one before, then the one two before.
-        #[inline(always)]
-        unsafe fn half(low: float64x2_t, high: float64x2_t) -> [float64x2_t; 2] {
-            unsafe {
-                let low_1 = vaddq_f64(low, vextq_f64::<1>(vdupq_n_f64(0.0), low));
-                let high_1 = vaddq_f64(high, vextq_f64::<1>(low, high));
-                [low_1, vaddq_f64(high_1, low_1)]
-            }
-        }
-        unsafe {
-            let ([low, low_last], [high, high_last]) = (half(a[0], a[1]), half(a[2], a[3]));
-            let total = vdupq_laneq_f64::<1>(low_last);
-            [low, low_last, vaddq_f64(high, total), vaddq_f64(high_last, total)]
-        }
-    }
-    #[inline(always)]
-    unsafe fn last_d(a: Self::D) -> Self::D {
-        unsafe { [vdupq_laneq_f64::<1>(a[3]); 4] }
-    }
-    #[inline(always)]
     unsafe fn widen(a: Self::F) -> Self::D {
         unsafe {
             [
@@ -374,121 +293,89 @@ impl Simd for Neon {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::super::portable::Portable;
-    use super::*;
+impl Groups for Neon {
+    twice!();
 
-    const FLOATS: [f32; 16] = [
-        0.0,
-        -0.0,
-        1.5,
-        -2.5,
-        0.1,
-        -7.3,
-        f32::NAN,
-        f32::INFINITY,
-        f32::NEG_INFINITY,
-        f32::MIN_POSITIVE,
-        1e-41,
-        3.5,
-        123_456.7,
-        -1e30,
-        2.5,
-        1.0,
-    ];
-
-    /// Groups of which every lane meets many values.
-    fn groups() -> impl Iterator<Item = ([f32; 8], [f32; 8])> {
-        (0..16).flat_map(|i| {
-            (0..16).map(move |j| {
-                let a = std::array::from_fn(|l| FLOATS[(l + i) % 16]);
-                (a, std::array::from_fn(|l| FLOATS[(3 * l + j) % 16]))
-            })
-        })
+    #[inline(always)]
+    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {
+        unsafe { [vld1q_f32(low), vld1q_f32(high)] }
     }
-
-    /// What the group operations give for one pair of groups, as bits. NaN are one value: only their signs and
-    /// payloads differ.
-    fn results<S: Simd>(a: [f32; 8], b: [f32; 8]) -> Vec<u64> {
-        let mut results = Vec::new();
-        // SAFETY: NEON is part of every 64-bit Arm, and the portable path runs everywhere.
+    #[inline(always)]
+    unsafe fn transpose_halves(rows: [Self::F; 4]) -> [Self::F; 4] {
+        let [a, b, c, d] = rows;
+        let mut columns = rows;
+        for half in 0..2 {
+            unsafe {
+                let even = |a: float32x4_t, b: float32x4_t| vreinterpretq_f64_f32(vtrn1q_f32(a, b));
+                let odd = |a: float32x4_t, b: float32x4_t| vreinterpretq_f64_f32(vtrn2q_f32(a, b));
+                let (ab_even, cd_even) = (even(a[half], b[half]), even(c[half], d[half]));
+                let (ab_odd, cd_odd) = (odd(a[half], b[half]), odd(c[half], d[half]));
+                columns[0][half] = vreinterpretq_f32_f64(vtrn1q_f64(ab_even, cd_even));
+                columns[1][half] = vreinterpretq_f32_f64(vtrn1q_f64(ab_odd, cd_odd));
+                columns[2][half] = vreinterpretq_f32_f64(vtrn2q_f64(ab_even, cd_even));
+                columns[3][half] = vreinterpretq_f32_f64(vtrn2q_f64(ab_odd, cd_odd));
+            }
+        }
+        columns
+    }
+    #[inline(always)]
+    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
+        unsafe { [vld1q_f64(low), vld1q_f64(low.add(2)), vld1q_f64(high), vld1q_f64(high.add(2))] }
+    }
+    #[inline(always)]
+    unsafe fn transpose_halves_d(rows: [Self::D; 4]) -> [Self::D; 4] {
+        let [a, b, c, d] = rows;
+        let mut columns = rows;
+        for half in [0, 2] {
+            for i in 0..2 {
+                unsafe {
+                    columns[2 * i][half] = vtrn1q_f64(a[half + i], b[half + i]);
+                    columns[2 * i][half + 1] = vtrn1q_f64(c[half + i], d[half + i]);
+                    columns[2 * i + 1][half] = vtrn2q_f64(a[half + i], b[half + i]);
+                    columns[2 * i + 1][half + 1] = vtrn2q_f64(c[half + i], d[half + i]);
+                }
+            }
+        }
+        columns
+    }
+    #[inline(always)]
+    unsafe fn prefix_sum_i(a: Self::I) -> Self::I {
+        #[inline(always)]
+        unsafe fn half(a: int32x4_t) -> int32x4_t {
+            unsafe {
+                let zero = vdupq_n_s32(0);
+                let a = vaddq_s32(a, vextq_s32::<3>(zero, a));
+                vaddq_s32(a, vextq_s32::<2>(zero, a))
+            }
+        }
         unsafe {
-            let (x, y) = (S::load(a.as_ptr()), S::load(b.as_ptr()));
-            let (dx, dy) = (S::widen(x), S::widen(y));
-            let tenth = S::splat_d(0.1);
-            let bits = S::bits(S::lt(x, y));
-            let floats = [
-                S::add(x, y),
-                S::sub(x, y),
-                S::mul(x, y),
-                S::div(x, y),
-                S::sqrt(x),
-                S::min(x, y),
-                S::max(x, y),
-                S::and(x, y),
-                S::or(x, y),
-                S::xor(x, y),
-                S::and_not(x, y),
-                S::select(S::mask(bits), x, y),
-                S::finite(x),
-                S::narrow(S::mul_d(dx, tenth)),
-                S::load_halves(b.as_ptr().add(3), a.as_ptr().add(1)),
-            ];
-            let transposed = S::transpose_halves([x, y, S::add(x, x), S::add(y, y)]);
-            let transposed_d = S::transpose_halves_d([dx, dy, S::add_d(dx, dx), S::add_d(dy, dy)]);
-            let small =
-                [x, y].map(|v| S::select(S::lt(S::abs(v), S::splat(1e6)), v, S::splat(-0.5)));
-            let (i, j) = (S::round_i(small[0]), S::truncate_i(small[1]));
-            let integers = [
-                i,
-                j,
-                S::add_i(i, j),
-                S::sub_i(i, j),
-                S::prefix_sum_i(i),
-                S::last_i(i),
-                S::select_i(bits, i, j),
-            ];
-            let doubles = [
-                dx,
-                S::add_d(dx, tenth),
-                S::sub_d(dx, dy),
-                S::mul_d(dx, dy),
-                S::div_d(dx, dy),
-                S::max_d(dx, dy),
-                S::select_bits_d(bits, dx, dy),
-                // A zero's sign may get lost.
-                S::add_d(S::prefix_sum_d(S::mul_d(S::widen(small[0]), tenth)), S::splat_d(0.0)),
-                S::last_d(dx),
-            ];
-            for value in floats.into_iter().chain(transposed).chain(integers.map(|i| S::float_i(i)))
-            {
-                let mut lanes = [0.0; 8];
-                S::store(lanes.as_mut_ptr(), value);
-                results.extend(lanes.map(|v: f32| {
-                    u64::from(if v.is_nan() { f32::NAN.to_bits() } else { v.to_bits() })
-                }));
-            }
-            for value in doubles.into_iter().chain(transposed_d) {
-                let mut lanes = [0.0; 8];
-                S::store_d(lanes.as_mut_ptr(), value);
-                results.extend(
-                    lanes.map(|v: f64| if v.is_nan() { f64::NAN.to_bits() } else { v.to_bits() }),
-                );
-            }
-            let masks = [bits, S::bits(S::eq(x, y)), S::bits_lt_d(dx, dy)];
-            results.extend(masks.map(u64::from));
+            let (low, high) = (half(a[0]), half(a[1]));
+            [low, vaddq_s32(high, vdupq_laneq_s32::<3>(low))]
         }
-        results
     }
-
-    #[test]
-    fn operations_equal_the_portable_ones() {
-        for (a, b) in groups() {
-            let (neon, portable) = (results::<Neon>(a, b), results::<Portable>(a, b));
-            for (at, (neon, portable)) in neon.into_iter().zip(portable).enumerate() {
-                assert_eq!(neon, portable, "value {at} of {a:?} {b:?}");
+    #[inline(always)]
+    unsafe fn last_i(a: Self::I) -> Self::I {
+        unsafe { [vdupq_laneq_s32::<3>(a[1]); 2] }
+    }
+    #[inline(always)]
+    unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
+        /// Four lanes: each gets the one before, then the one two before.
+        #[inline(always)]
+        unsafe fn half(low: float64x2_t, high: float64x2_t) -> [float64x2_t; 2] {
+            unsafe {
+                let low_1 = vaddq_f64(low, vextq_f64::<1>(vdupq_n_f64(0.0), low));
+                let high_1 = vaddq_f64(high, vextq_f64::<1>(low, high));
+                [low_1, vaddq_f64(high_1, low_1)]
             }
         }
+        unsafe {
+            let ([low, low_last], [high, high_last]) = (half(a[0], a[1]), half(a[2], a[3]));
+            let total = vdupq_laneq_f64::<1>(low_last);
+            [low, low_last, vaddq_f64(high, total), vaddq_f64(high_last, total)]
+        }
+    }
+    #[inline(always)]
+    unsafe fn last_d(a: Self::D) -> Self::D {
+        unsafe { [vdupq_laneq_f64::<1>(a[3]); 4] }
     }
 }

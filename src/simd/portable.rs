@@ -1,6 +1,7 @@
 //! Eight lanes without any instruction set: what processors without a path of their own use.
 
-use super::{GROUP, Simd};
+use super::twice::twice;
+use super::{GROUP, Groups, Simd};
 
 #[derive(Clone, Copy)]
 pub(crate) struct Portable;
@@ -75,6 +76,7 @@ fn transpose_halves<T: Copy>(rows: [[T; GROUP]; 4]) -> [[T; GROUP]; 4] {
 }
 
 impl Simd for Portable {
+    const LANES: usize = GROUP;
     type F = F;
     type I = I;
     type D = D;
@@ -87,11 +89,6 @@ impl Simd for Portable {
     unsafe fn load(from: *const f32) -> F {
         // SAFETY: promised by the caller.
         unsafe { from.cast::<F>().read_unaligned() }
-    }
-    #[inline(always)]
-    unsafe fn load_halves(low: *const f32, high: *const f32) -> F {
-        // SAFETY: promised by the caller.
-        unsafe { load_halves(low, high) }
     }
     #[inline(always)]
     unsafe fn store(to: *mut f32, value: F) {
@@ -156,11 +153,6 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
-    unsafe fn transpose_halves(rows: [F; 4]) -> [F; 4] {
-        transpose_halves(rows)
-    }
-
-    #[inline(always)]
     unsafe fn load_i(from: *const i32) -> I {
         // SAFETY: promised by the caller.
         unsafe { from.cast::<I>().read_unaligned() }
@@ -181,14 +173,6 @@ impl Simd for Portable {
     #[inline(always)]
     unsafe fn sub_i(a: I, b: I) -> I {
         zip(a, b, i32::wrapping_sub)
-    }
-    #[inline(always)]
-    unsafe fn prefix_sum_i(a: I) -> I {
-        prefix_sum(a, i32::wrapping_add)
-    }
-    #[inline(always)]
-    unsafe fn last_i(a: I) -> I {
-        [a[GROUP - 1]; GROUP]
     }
     #[inline(always)]
     unsafe fn select_i(bits: u32, yes: I, no: I) -> I {
@@ -219,11 +203,6 @@ impl Simd for Portable {
     unsafe fn load_d(from: *const f64) -> D {
         // SAFETY: promised by the caller.
         unsafe { from.cast::<D>().read_unaligned() }
-    }
-    #[inline(always)]
-    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> D {
-        // SAFETY: promised by the caller.
-        unsafe { load_halves(low, high) }
     }
     #[inline(always)]
     unsafe fn store_d(to: *mut f64, value: D) {
@@ -263,8 +242,43 @@ impl Simd for Portable {
         lanes
     }
     #[inline(always)]
+    unsafe fn widen(a: F) -> D {
+        zip(a, a, |a, _| f64::from(a))
+    }
+    #[inline(always)]
+    unsafe fn narrow(a: D) -> F {
+        zip(a, a, |a, _| a as f32)
+    }
+}
+
+impl Groups for Portable {
+    twice!();
+
+    #[inline(always)]
+    unsafe fn load_halves(low: *const f32, high: *const f32) -> F {
+        // SAFETY: promised by the caller.
+        unsafe { load_halves(low, high) }
+    }
+    #[inline(always)]
+    unsafe fn transpose_halves(rows: [F; 4]) -> [F; 4] {
+        transpose_halves(rows)
+    }
+    #[inline(always)]
+    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> D {
+        // SAFETY: promised by the caller.
+        unsafe { load_halves(low, high) }
+    }
+    #[inline(always)]
     unsafe fn transpose_halves_d(rows: [D; 4]) -> [D; 4] {
         transpose_halves(rows)
+    }
+    #[inline(always)]
+    unsafe fn prefix_sum_i(a: I) -> I {
+        prefix_sum(a, i32::wrapping_add)
+    }
+    #[inline(always)]
+    unsafe fn last_i(a: I) -> I {
+        [a[GROUP - 1]; GROUP]
     }
     #[inline(always)]
     unsafe fn prefix_sum_d(a: D) -> D {
@@ -273,13 +287,5 @@ impl Simd for Portable {
     #[inline(always)]
     unsafe fn last_d(a: D) -> D {
         [a[GROUP - 1]; GROUP]
-    }
-    #[inline(always)]
-    unsafe fn widen(a: F) -> D {
-        zip(a, a, |a, _| f64::from(a))
-    }
-    #[inline(always)]
-    unsafe fn narrow(a: D) -> F {
-        zip(a, a, |a, _| a as f32)
     }
 }

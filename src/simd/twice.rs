@@ -2,10 +2,34 @@
 
 use super::Simd;
 
-/// Two groups of `S`. Masks of lanes have 16 bits, the first group's in the lower half. Groups are paired from two
-/// loads; nothing here reads or writes memory.
+/// Two groups of `S`. Masks of lanes have 16 bits, the first group's in the lower half.
 #[derive(Clone, Copy)]
 pub(crate) struct Twice<S>(std::marker::PhantomData<S>);
+
+/// What makes pairs of an instruction set's groups two groups.
+macro_rules! twice {
+    () => {
+        type Pair = $crate::simd::twice::Twice<Self>;
+
+        #[inline(always)]
+        unsafe fn pair(first: Self::F, second: Self::F) -> [Self::F; 2] {
+            [first, second]
+        }
+        #[inline(always)]
+        unsafe fn pair_i(first: Self::I, second: Self::I) -> [Self::I; 2] {
+            [first, second]
+        }
+        #[inline(always)]
+        unsafe fn pair_d(first: Self::D, second: Self::D) -> [Self::D; 2] {
+            [first, second]
+        }
+        #[inline(always)]
+        unsafe fn groups(pair: [Self::F; 2]) -> [Self::F; 2] {
+            pair
+        }
+    };
+}
+pub(crate) use twice;
 
 macro_rules! each {
     ($($name:ident($($operand:ident: $type:ident),*) -> $result:ident;)*) => {
@@ -18,6 +42,7 @@ macro_rules! each {
 }
 
 impl<S: Simd> Simd for Twice<S> {
+    const LANES: usize = 2 * S::LANES;
     type F = [S::F; 2];
     type I = [S::I; 2];
     type D = [S::D; 2];
@@ -39,8 +64,6 @@ impl<S: Simd> Simd for Twice<S> {
         select(mask: F, yes: F, no: F) -> F;
         add_i(a: I, b: I) -> I;
         sub_i(a: I, b: I) -> I;
-        prefix_sum_i(a: I) -> I;
-        last_i(a: I) -> I;
         round_i(a: F) -> I;
         truncate_i(a: F) -> I;
         float_i(a: I) -> F;
@@ -49,8 +72,6 @@ impl<S: Simd> Simd for Twice<S> {
         mul_d(a: D, b: D) -> D;
         div_d(a: D, b: D) -> D;
         max_d(a: D, b: D) -> D;
-        prefix_sum_d(a: D) -> D;
-        last_d(a: D) -> D;
         widen(a: F) -> D;
         narrow(a: D) -> F;
     }
@@ -74,11 +95,6 @@ impl<S: Simd> Simd for Twice<S> {
     unsafe fn load(from: *const f32) -> Self::F {
         // SAFETY: as the caller's.
         unsafe { [S::load(from), S::load(from.add(super::GROUP))] }
-    }
-    #[inline(always)]
-    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {
-        // SAFETY: as the caller's.
-        [unsafe { S::load_halves(low, high) }; 2]
     }
     #[inline(always)]
     unsafe fn store(to: *mut f32, value: Self::F) {
@@ -107,11 +123,6 @@ impl<S: Simd> Simd for Twice<S> {
         unsafe { [S::load_d(from), S::load_d(from.add(super::GROUP))] }
     }
     #[inline(always)]
-    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
-        // SAFETY: as the caller's.
-        [unsafe { S::load_halves_d(low, high) }; 2]
-    }
-    #[inline(always)]
     unsafe fn store_d(to: *mut f64, value: Self::D) {
         // SAFETY: as the caller's.
         unsafe {
@@ -120,26 +131,9 @@ impl<S: Simd> Simd for Twice<S> {
         }
     }
     #[inline(always)]
-    unsafe fn transpose_halves([a, b, c, d]: [Self::F; 4]) -> [Self::F; 4] {
+    unsafe fn mask(bits: u32) -> Self::F {
         // SAFETY: as the caller's.
-        let (first, second) = unsafe {
-            (
-                S::transpose_halves([a[0], b[0], c[0], d[0]]),
-                S::transpose_halves([a[1], b[1], c[1], d[1]]),
-            )
-        };
-        [0, 1, 2, 3].map(|row| [first[row], second[row]])
-    }
-    #[inline(always)]
-    unsafe fn transpose_halves_d([a, b, c, d]: [Self::D; 4]) -> [Self::D; 4] {
-        // SAFETY: as the caller's.
-        let (first, second) = unsafe {
-            (
-                S::transpose_halves_d([a[0], b[0], c[0], d[0]]),
-                S::transpose_halves_d([a[1], b[1], c[1], d[1]]),
-            )
-        };
-        [0, 1, 2, 3].map(|row| [first[row], second[row]])
+        unsafe { [S::mask(bits), S::mask(bits >> super::GROUP)] }
     }
     #[inline(always)]
     unsafe fn bits(mask: Self::F) -> u32 {

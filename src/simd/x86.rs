@@ -1,13 +1,12 @@
 //! Eight lanes on x86-64: two SSE2 registers, or one of AVX2.
-//!
-//! AVX-512 processors run the AVX2 form compiled for their instruction set.
 
 // Every block calls intrinsics of the instruction set that the trait's contract promises.
 #![allow(clippy::undocumented_unsafe_blocks)]
 
 use std::arch::x86_64::*;
 
-use super::Simd;
+use super::twice::twice;
+use super::{GROUP, Groups, Simd};
 
 /// What every x86-64 has.
 #[derive(Clone, Copy)]
@@ -36,6 +35,7 @@ macro_rules! each {
 }
 
 impl Simd for Sse2 {
+    const LANES: usize = GROUP;
     type F = [__m128; 2];
     type I = [__m128i; 2];
     type D = [__m128d; 4];
@@ -47,10 +47,6 @@ impl Simd for Sse2 {
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self::F {
         unsafe { [_mm_loadu_ps(from), _mm_loadu_ps(from.add(4))] }
-    }
-    #[inline(always)]
-    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {
-        unsafe { [_mm_loadu_ps(low), _mm_loadu_ps(high)] }
     }
     #[inline(always)]
     unsafe fn store(to: *mut f32, value: Self::F) {
@@ -117,15 +113,6 @@ impl Simd for Sse2 {
     }
 
     #[inline(always)]
-    unsafe fn transpose_halves(rows: [Self::F; 4]) -> [Self::F; 4] {
-        let [mut a, mut b, mut c, mut d] = rows;
-        for half in 0..2 {
-            unsafe { _MM_TRANSPOSE4_PS(&mut a[half], &mut b[half], &mut c[half], &mut d[half]) };
-        }
-        [a, b, c, d]
-    }
-
-    #[inline(always)]
     unsafe fn load_i(from: *const i32) -> Self::I {
         unsafe { [_mm_loadu_si128(from.cast()), _mm_loadu_si128(from.add(4).cast())] }
     }
@@ -147,24 +134,6 @@ impl Simd for Sse2 {
     #[inline(always)]
     unsafe fn sub_i(a: Self::I, b: Self::I) -> Self::I {
         unsafe { each!(_mm_sub_epi32, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn prefix_sum_i(a: Self::I) -> Self::I {
-        #[inline(always)]
-        unsafe fn half(mut a: __m128i) -> __m128i {
-            unsafe {
-                a = _mm_add_epi32(a, _mm_slli_si128::<4>(a));
-                _mm_add_epi32(a, _mm_slli_si128::<8>(a))
-            }
-        }
-        unsafe {
-            let (low, high) = (half(a[0]), half(a[1]));
-            [low, _mm_add_epi32(high, _mm_shuffle_epi32::<0xff>(low))]
-        }
-    }
-    #[inline(always)]
-    unsafe fn last_i(a: Self::I) -> Self::I {
-        unsafe { [_mm_shuffle_epi32::<0xff>(a[1]); 2] }
     }
     #[inline(always)]
     unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
@@ -199,17 +168,6 @@ impl Simd for Sse2 {
                 _mm_loadu_pd(from.add(2)),
                 _mm_loadu_pd(from.add(4)),
                 _mm_loadu_pd(from.add(6)),
-            ]
-        }
-    }
-    #[inline(always)]
-    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
-        unsafe {
-            [
-                _mm_loadu_pd(low),
-                _mm_loadu_pd(low.add(2)),
-                _mm_loadu_pd(high),
-                _mm_loadu_pd(high.add(2)),
             ]
         }
     }
@@ -261,6 +219,54 @@ impl Simd for Sse2 {
         }
     }
     #[inline(always)]
+    unsafe fn widen(a: Self::F) -> Self::D {
+        unsafe {
+            [
+                _mm_cvtps_pd(a[0]),
+                _mm_cvtps_pd(_mm_movehl_ps(a[0], a[0])),
+                _mm_cvtps_pd(a[1]),
+                _mm_cvtps_pd(_mm_movehl_ps(a[1], a[1])),
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn narrow(a: Self::D) -> Self::F {
+        unsafe {
+            [
+                _mm_movelh_ps(_mm_cvtpd_ps(a[0]), _mm_cvtpd_ps(a[1])),
+                _mm_movelh_ps(_mm_cvtpd_ps(a[2]), _mm_cvtpd_ps(a[3])),
+            ]
+        }
+    }
+}
+
+impl Groups for Sse2 {
+    twice!();
+
+    #[inline(always)]
+    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {
+        unsafe { [_mm_loadu_ps(low), _mm_loadu_ps(high)] }
+    }
+    #[inline(always)]
+    unsafe fn transpose_halves(rows: [Self::F; 4]) -> [Self::F; 4] {
+        let [mut a, mut b, mut c, mut d] = rows;
+        for half in 0..2 {
+            unsafe { _MM_TRANSPOSE4_PS(&mut a[half], &mut b[half], &mut c[half], &mut d[half]) };
+        }
+        [a, b, c, d]
+    }
+    #[inline(always)]
+    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
+        unsafe {
+            [
+                _mm_loadu_pd(low),
+                _mm_loadu_pd(low.add(2)),
+                _mm_loadu_pd(high),
+                _mm_loadu_pd(high.add(2)),
+            ]
+        }
+    }
+    #[inline(always)]
     unsafe fn transpose_halves_d(rows: [Self::D; 4]) -> [Self::D; 4] {
         let [a, b, c, d] = rows;
         let mut columns = rows;
@@ -275,6 +281,24 @@ impl Simd for Sse2 {
             }
         }
         columns
+    }
+    #[inline(always)]
+    unsafe fn prefix_sum_i(a: Self::I) -> Self::I {
+        #[inline(always)]
+        unsafe fn half(mut a: __m128i) -> __m128i {
+            unsafe {
+                a = _mm_add_epi32(a, _mm_slli_si128::<4>(a));
+                _mm_add_epi32(a, _mm_slli_si128::<8>(a))
+            }
+        }
+        unsafe {
+            let (low, high) = (half(a[0]), half(a[1]));
+            [low, _mm_add_epi32(high, _mm_shuffle_epi32::<0xff>(low))]
+        }
+    }
+    #[inline(always)]
+    unsafe fn last_i(a: Self::I) -> Self::I {
+        unsafe { [_mm_shuffle_epi32::<0xff>(a[1]); 2] }
     }
     #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
@@ -298,29 +322,10 @@ impl Simd for Sse2 {
     unsafe fn last_d(a: Self::D) -> Self::D {
         unsafe { [_mm_unpackhi_pd(a[3], a[3]); 4] }
     }
-    #[inline(always)]
-    unsafe fn widen(a: Self::F) -> Self::D {
-        unsafe {
-            [
-                _mm_cvtps_pd(a[0]),
-                _mm_cvtps_pd(_mm_movehl_ps(a[0], a[0])),
-                _mm_cvtps_pd(a[1]),
-                _mm_cvtps_pd(_mm_movehl_ps(a[1], a[1])),
-            ]
-        }
-    }
-    #[inline(always)]
-    unsafe fn narrow(a: Self::D) -> Self::F {
-        unsafe {
-            [
-                _mm_movelh_ps(_mm_cvtpd_ps(a[0]), _mm_cvtpd_ps(a[1])),
-                _mm_movelh_ps(_mm_cvtpd_ps(a[2]), _mm_cvtpd_ps(a[3])),
-            ]
-        }
-    }
 }
 
 impl Simd for Avx2 {
+    const LANES: usize = GROUP;
     type F = __m256;
     type I = __m256i;
     type D = [__m256d; 2];
@@ -332,10 +337,6 @@ impl Simd for Avx2 {
     #[inline(always)]
     unsafe fn load(from: *const f32) -> Self::F {
         unsafe { _mm256_loadu_ps(from) }
-    }
-    #[inline(always)]
-    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {
-        unsafe { _mm256_loadu2_m128(high, low) }
     }
     #[inline(always)]
     unsafe fn store(to: *mut f32, value: Self::F) {
@@ -407,19 +408,6 @@ impl Simd for Avx2 {
             _mm256_castsi256_ps(_mm256_blendv_epi8(no, yes, mask))
         }
     }
-    #[inline(always)]
-    unsafe fn transpose_halves([a, b, c, d]: [Self::F; 4]) -> [Self::F; 4] {
-        unsafe {
-            let (ab_low, cd_low) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
-            let (ab_high, cd_high) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
-            [
-                _mm256_shuffle_ps::<0x44>(ab_low, cd_low),
-                _mm256_shuffle_ps::<0xee>(ab_low, cd_low),
-                _mm256_shuffle_ps::<0x44>(ab_high, cd_high),
-                _mm256_shuffle_ps::<0xee>(ab_high, cd_high),
-            ]
-        }
-    }
 
     #[inline(always)]
     unsafe fn load_i(from: *const i32) -> Self::I {
@@ -440,20 +428,6 @@ impl Simd for Avx2 {
     #[inline(always)]
     unsafe fn sub_i(a: Self::I, b: Self::I) -> Self::I {
         unsafe { _mm256_sub_epi32(a, b) }
-    }
-    #[inline(always)]
-    unsafe fn prefix_sum_i(a: Self::I) -> Self::I {
-        unsafe {
-            let a = _mm256_add_epi32(a, _mm256_slli_si256::<4>(a));
-            let a = _mm256_add_epi32(a, _mm256_slli_si256::<8>(a));
-            // The low half's total, for the high half.
-            let totals = _mm256_shuffle_epi32::<0xff>(a);
-            _mm256_add_epi32(a, _mm256_permute2x128_si256::<0x08>(totals, totals))
-        }
-    }
-    #[inline(always)]
-    unsafe fn last_i(a: Self::I) -> Self::I {
-        unsafe { _mm256_permutevar8x32_epi32(a, _mm256_set1_epi32(7)) }
     }
     #[inline(always)]
     unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
@@ -479,10 +453,6 @@ impl Simd for Avx2 {
     #[inline(always)]
     unsafe fn load_d(from: *const f64) -> Self::D {
         unsafe { [_mm256_loadu_pd(from), _mm256_loadu_pd(from.add(4))] }
-    }
-    #[inline(always)]
-    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
-        unsafe { [_mm256_loadu_pd(low), _mm256_loadu_pd(high)] }
     }
     #[inline(always)]
     unsafe fn store_d(to: *mut f64, value: Self::D) {
@@ -531,6 +501,45 @@ impl Simd for Avx2 {
         }
     }
     #[inline(always)]
+    unsafe fn widen(a: Self::F) -> Self::D {
+        unsafe {
+            [
+                _mm256_cvtps_pd(_mm256_castps256_ps128(a)),
+                _mm256_cvtps_pd(_mm256_extractf128_ps::<1>(a)),
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn narrow(a: Self::D) -> Self::F {
+        unsafe { _mm256_set_m128(_mm256_cvtpd_ps(a[1]), _mm256_cvtpd_ps(a[0])) }
+    }
+}
+
+impl Groups for Avx2 {
+    twice!();
+
+    #[inline(always)]
+    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {
+        unsafe { _mm256_loadu2_m128(high, low) }
+    }
+    #[inline(always)]
+    unsafe fn transpose_halves([a, b, c, d]: [Self::F; 4]) -> [Self::F; 4] {
+        unsafe {
+            let (ab_low, cd_low) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
+            let (ab_high, cd_high) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
+            [
+                _mm256_shuffle_ps::<0x44>(ab_low, cd_low),
+                _mm256_shuffle_ps::<0xee>(ab_low, cd_low),
+                _mm256_shuffle_ps::<0x44>(ab_high, cd_high),
+                _mm256_shuffle_ps::<0xee>(ab_high, cd_high),
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
+        unsafe { [_mm256_loadu_pd(low), _mm256_loadu_pd(high)] }
+    }
+    #[inline(always)]
     unsafe fn transpose_halves_d(rows: [Self::D; 4]) -> [Self::D; 4] {
         let [a, b, c, d] = rows;
         let mut columns = rows;
@@ -547,6 +556,20 @@ impl Simd for Avx2 {
             }
         }
         columns
+    }
+    #[inline(always)]
+    unsafe fn prefix_sum_i(a: Self::I) -> Self::I {
+        unsafe {
+            let a = _mm256_add_epi32(a, _mm256_slli_si256::<4>(a));
+            let a = _mm256_add_epi32(a, _mm256_slli_si256::<8>(a));
+            // The low half's total, for the high half.
+            let totals = _mm256_shuffle_epi32::<0xff>(a);
+            _mm256_add_epi32(a, _mm256_permute2x128_si256::<0x08>(totals, totals))
+        }
+    }
+    #[inline(always)]
+    unsafe fn last_i(a: Self::I) -> Self::I {
+        unsafe { _mm256_permutevar8x32_epi32(a, _mm256_set1_epi32(7)) }
     }
     #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
@@ -567,18 +590,5 @@ impl Simd for Avx2 {
     #[inline(always)]
     unsafe fn last_d(a: Self::D) -> Self::D {
         unsafe { [_mm256_permute4x64_pd::<0xff>(a[1]); 2] }
-    }
-    #[inline(always)]
-    unsafe fn widen(a: Self::F) -> Self::D {
-        unsafe {
-            [
-                _mm256_cvtps_pd(_mm256_castps256_ps128(a)),
-                _mm256_cvtps_pd(_mm256_extractf128_ps::<1>(a)),
-            ]
-        }
-    }
-    #[inline(always)]
-    unsafe fn narrow(a: Self::D) -> Self::F {
-        unsafe { _mm256_set_m128(_mm256_cvtpd_ps(a[1]), _mm256_cvtpd_ps(a[0])) }
     }
 }

@@ -8,14 +8,14 @@ use crate::paper::{
     BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, JITTER, MISFIT, NEAR, NEAR_NOISE, PLACES, REACH,
     inverse_depth,
 };
-use crate::simd::{GROUP, Simd};
+use crate::simd::{GROUP, Groups};
 
 /// Finds the choices of the pixels of a row of blocks, which are none so far.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-pub(super) unsafe fn row<S: Simd>(even: &EvenWindows, row: usize, choices: &mut [Option<u32>]) {
+pub(super) unsafe fn row<S: Groups>(even: &EvenWindows, row: usize, choices: &mut [Option<u32>]) {
     let neighbours = Neighbours::new(even.cloud, row);
     // SAFETY: as the caller's.
     let noise = unsafe { Floats::<S>::splat(0.0) };
@@ -48,7 +48,7 @@ struct Group<'a> {
 }
 
 /// Columns or rows of blocks, one for each of eight.
-struct Lines<S: Simd> {
+struct Lines<S: Groups> {
     /// The number of the first block in the row, or that of the column.
     first: [usize; GROUP],
     /// The ways in pixels to the eight's own.
@@ -56,7 +56,7 @@ struct Lines<S: Simd> {
 }
 
 /// Windows that the pixels of eight blocks may take, one each.
-struct Candidates<S: Simd> {
+struct Candidates<S: Groups> {
     /// The blocks whose windows they are.
     places: [u32; GROUP],
     /// The mask of the blocks that may take theirs.
@@ -77,7 +77,7 @@ struct Candidates<S: Simd> {
 }
 
 /// Of the points next to each of eight pixels, as the plain form has them.
-struct Near<S: Simd> {
+struct Near<S: Groups> {
     inverse_depth: Floats<S>,
     offset: [Floats<S>; 2],
     points: Floats<S>,
@@ -85,7 +85,7 @@ struct Near<S: Simd> {
     own: Floats<S>,
 }
 
-impl<S: Simd> Candidates<S> {
+impl<S: Groups> Candidates<S> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     unsafe fn none() -> Self {
@@ -111,7 +111,7 @@ impl<S: Simd> Candidates<S> {
 }
 
 /// The windows that the pixels of eight blocks may take.
-struct Found<S: Simd> {
+struct Found<S: Groups> {
     /// Only so many mean something.
     candidates: Vec<Candidates<S>>,
     number: usize,
@@ -119,7 +119,7 @@ struct Found<S: Simd> {
     noise: Floats<S>,
 }
 
-impl<S: Simd> Found<S> {
+impl<S: Groups> Found<S> {
     /// Adds the windows of the blocks in these columns and rows, for the eight blocks of a mask.
     ///
     /// # Safety
@@ -201,7 +201,7 @@ impl Group<'_> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn candidates<S: Simd>(&self, found: &mut Found<S>) {
+    unsafe fn candidates<S: Groups>(&self, found: &mut Found<S>) {
         let &Group { even, row, first, count } = self;
         let Blocks { across, down, .. } = even.asked.blocks;
         let own = row * across + first;
@@ -260,7 +260,7 @@ impl Group<'_> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn choose<S: Simd>(
+    unsafe fn choose<S: Groups>(
         &self,
         found: &Found<S>,
         neighbours: &Neighbours,
@@ -322,7 +322,7 @@ impl Group<'_> {
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn lines<S: Simd>(own: Floats<S>, at: Floats<S>, number: usize) -> Lines<S> {
+unsafe fn lines<S: Groups>(own: Floats<S>, at: Floats<S>, number: usize) -> Lines<S> {
     let mut first = [0; GROUP];
     // SAFETY: as the caller's.
     let to_own = unsafe {
@@ -337,7 +337,7 @@ unsafe fn lines<S: Simd>(own: Floats<S>, at: Floats<S>, number: usize) -> Lines<
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn around<S: Simd>(
+unsafe fn around<S: Groups>(
     own: Floats<S>,
     distance: Floats<S>,
     count: usize,
@@ -380,7 +380,12 @@ impl Neighbours {
     /// # Safety
     /// The processor has the instruction set of `S`; the blocks are inside the image but for those that make up eight.
     #[inline(always)]
-    unsafe fn near<S: Simd>(&self, first: usize, [column, row]: [usize; 2], clean: u32) -> Near<S> {
+    unsafe fn near<S: Groups>(
+        &self,
+        first: usize,
+        [column, row]: [usize; 2],
+        clean: u32,
+    ) -> Near<S> {
         // SAFETY: as the caller's; columns hold whole groups, and an element before and behind.
         unsafe {
             let zero = Floats::<S>::splat(0.0);

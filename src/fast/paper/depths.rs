@@ -2,7 +2,7 @@
 
 use crate::cloud::Points;
 use crate::options::{Depth, Options};
-use crate::simd::{GROUP, Simd};
+use crate::simd::{GROUP, Groups};
 
 /// Elements of a row of depths: the width, and a group of NaN or more behind it.
 pub(crate) fn row_length(width: usize) -> usize {
@@ -14,7 +14,7 @@ pub(crate) fn row_length(width: usize) -> usize {
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-pub(crate) unsafe fn read<S: Simd>(
+pub(crate) unsafe fn read<S: Groups>(
     points: &Points,
     options: &Options,
     y: usize,

@@ -12,7 +12,7 @@ use crate::paper::{
     Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, Plane,
     inverse_depth,
 };
-use crate::simd::{GROUP, Simd};
+use crate::simd::{GROUP, Groups};
 
 /// A rectangle of the image whose blocks' even windows are found together.
 pub(super) struct EvenTile<'a> {
@@ -28,7 +28,7 @@ pub(super) struct EvenTile<'a> {
 
 /// Eight windows and their planes.
 #[derive(Clone, Copy)]
-struct Fits<S: Simd> {
+struct Fits<S: Groups> {
     /// 0 for no window.
     radii: Doubles<S>,
     /// Of the planes at the pixels.
@@ -40,7 +40,7 @@ struct Fits<S: Simd> {
     noise: Doubles<S>,
 }
 
-impl<S: Simd> Fits<S> {
+impl<S: Groups> Fits<S> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
@@ -94,7 +94,11 @@ impl EvenTile<'_> {
     /// # Safety
     /// The processor has the instruction set of `S`; no one else writes the tile's blocks.
     #[inline(always)]
-    pub unsafe fn compute<S: Simd>(&self, rings: &mut Rings<MOMENTS>, windows: &Parts<EvenWindow>) {
+    pub unsafe fn compute<S: Groups>(
+        &self,
+        rings: &mut Rings<MOMENTS>,
+        windows: &Parts<EvenWindow>,
+    ) {
         let reach = self.largest;
         let &Cloud { width, height, ref depths, .. } = self.cloud;
         let columns = reached(&self.columns, reach, width);
@@ -133,7 +137,7 @@ impl EvenTile<'_> {
     /// # Safety
     /// The processor has the instruction set of `S`; the rings hold what the windows need.
     #[inline(always)]
-    unsafe fn eight<S: Simd>(
+    unsafe fn eight<S: Groups>(
         &self,
         rings: &Rings<MOMENTS>,
         moments: &CovarianceMatrix,
@@ -191,7 +195,7 @@ impl EvenTile<'_> {
     /// # Safety
     /// As [`EvenTile::eight`]'s.
     #[inline(always)]
-    unsafe fn fits<S: Simd>(
+    unsafe fn fits<S: Groups>(
         &self,
         rings: &Rings<MOMENTS>,
         moments: &CovarianceMatrix,
@@ -240,7 +244,7 @@ impl EvenTile<'_> {
     /// # Safety
     /// As [`EvenTile::eight`]'s.
     #[inline(always)]
-    unsafe fn jagged<S: Simd>(
+    unsafe fn jagged<S: Groups>(
         &self,
         fits: &Fits<S>,
         (x, y): (usize, usize),
@@ -264,7 +268,7 @@ impl EvenTile<'_> {
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn columns<S: Simd>(x: usize) -> Floats<S> {
+unsafe fn columns<S: Groups>(x: usize) -> Floats<S> {
     // SAFETY: as the caller's.
     unsafe { Floats::load(STEPS.as_ptr()) * Floats::splat(BLOCK as f32) + Floats::splat(x as f32) }
 }
@@ -274,7 +278,7 @@ unsafe fn columns<S: Simd>(x: usize) -> Floats<S> {
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn side<S: Simd>(at: Floats<S>, radii: Floats<S>, count: usize) -> Floats<S> {
+unsafe fn side<S: Groups>(at: Floats<S>, radii: Floats<S>, count: usize) -> Floats<S> {
     // SAFETY: as the caller's.
     let [start, end] = unsafe { range::<S>(at.0, radii.0, 0.0, count as f32) };
     Floats(end) - Floats(start)

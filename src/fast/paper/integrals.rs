@@ -6,7 +6,7 @@ use crate::cloud::Points;
 use crate::fast::lanes::transpose4;
 use crate::fast::planes::grow;
 use crate::paper::{BLOCK, inverse_depth};
-use crate::simd::{GROUP, Simd};
+use crate::simd::{GROUP, Groups};
 
 /// x, y, z, and 1; zeros for a missing point.
 pub(crate) type Counted = [f32; 4];
@@ -108,7 +108,7 @@ impl<const N: usize> Rings<N> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn read<S: Simd>(
+    pub unsafe fn read<S: Groups>(
         &mut self,
         points: &Points,
         depths: &[f32],

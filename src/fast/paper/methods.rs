@@ -7,7 +7,7 @@ use crate::fast::arithmetic::{Doubles, Floats, cross, dot};
 use crate::fast::moments::{WindowMoments, plane, sum_of_moments};
 use crate::fast::tile::{Bits, Found};
 use crate::paper::{CleanPoints, ROUNDING, Rect};
-use crate::simd::{GROUP, Simd};
+use crate::simd::{GROUP, Groups};
 
 /// A method's sums and normals.
 pub(crate) trait Sums<const N: usize>: Channels<N> {
@@ -29,7 +29,7 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
     ///
     /// # Safety
     /// The processor has the instruction set of `S`; the rectangles are of a ring that has these points.
-    unsafe fn normals<S: Simd>(
+    unsafe fn normals<S: Groups>(
         sums: &[Doubles<S>; N],
         rects: &Rects,
         points: &[Counted],
@@ -89,7 +89,7 @@ impl Sums<MOMENTS> for CovarianceMatrix {
     }
 
     #[inline(always)]
-    unsafe fn normals<S: Simd>(
+    unsafe fn normals<S: Groups>(
         sums: &[Doubles<S>; MOMENTS],
         _: &Rects,
         _: &[Counted],
@@ -135,7 +135,10 @@ fn error_of_differences(count: usize, largest: f32) -> f64 {
 /// # Safety
 /// The processor has the instruction set of `S`; all of `places` are inside.
 #[inline(always)]
-pub(crate) unsafe fn gather<S: Simd>(points: &[Counted], places: &[i32; GROUP]) -> [Floats<S>; 4] {
+pub(crate) unsafe fn gather<S: Groups>(
+    points: &[Counted],
+    places: &[i32; GROUP],
+) -> [Floats<S>; 4] {
     debug_assert!(places.iter().all(|at| (*at as usize) < points.len()));
     let points = points.as_ptr();
     // SAFETY: as the caller's; a point is half a group.
@@ -171,7 +174,7 @@ impl Sums<8> for Gradients {
     }
 
     #[inline(always)]
-    unsafe fn normals<S: Simd>(
+    unsafe fn normals<S: Groups>(
         sums: &[Doubles<S>; 8],
         _: &Rects,
         _: &[Counted],
@@ -210,7 +213,7 @@ impl Sums<4> for SmoothedDepthChanges {
     }
 
     #[inline(always)]
-    unsafe fn normals<S: Simd>(
+    unsafe fn normals<S: Groups>(
         sums: &[Doubles<S>; 4],
         rects: &Rects,
         points: &[Counted],
@@ -241,7 +244,7 @@ impl Sums<4> for SmoothedDepthChanges {
 /// # Safety
 /// As [`Sums::normals`].
 #[inline(always)]
-unsafe fn outermost<S: Simd>(
+unsafe fn outermost<S: Groups>(
     rects: &Rects,
     line: usize,
     points: &[Counted],
@@ -286,7 +289,7 @@ const DOUBT_TINY: f32 = 1e-30;
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn across<S: Simd>(h: [Floats<S>; 3], v: [Floats<S>; 3], error: f64) -> Found<S> {
+unsafe fn across<S: Groups>(h: [Floats<S>; 3], v: [Floats<S>; 3], error: f64) -> Found<S> {
     // SAFETY: as the caller's.
     unsafe {
         let n = cross(v, h);

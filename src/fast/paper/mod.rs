@@ -28,7 +28,7 @@ use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::options::{DistanceMetric, Method, Options};
 use crate::paper::{Asked, BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, PaperMaps};
-use crate::simd::{GROUP, Simd};
+use crate::simd::{GROUP, Groups};
 
 /// Elements of a tile's rings at most: floats hold their indices. Room for the largest windows there are.
 const MOST_INDICES: usize = 1 << 24;
@@ -350,7 +350,7 @@ impl Task for DepthsTask<'_> {
     type Output = ();
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
+    unsafe fn run<S: Groups>(self) {
         let DepthsTask { points, options, y, whole_points, depths } = self;
         // SAFETY: as the caller's.
         unsafe { depths::read::<S>(points, options, y, whole_points, depths) };
@@ -368,7 +368,7 @@ impl Task for SweepTask<'_> {
     type Output = f32;
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(mut self) -> f32 {
+    unsafe fn run<S: Groups>(mut self) -> f32 {
         // SAFETY: as the caller's.
         unsafe { self.sweep.radii::<S>(&mut self.rows, &self.options.paper) }
     }
@@ -385,7 +385,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Task for TileTask<'a, '_, F> {
     type Output = ();
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
+    unsafe fn run<S: Groups>(self) {
         let TileTask { tile, scratch, sink } = self;
         // SAFETY: as the caller's.
         unsafe {
@@ -418,7 +418,7 @@ impl Task for EvenTask<'_, '_> {
     type Output = ();
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
+    unsafe fn run<S: Groups>(self) {
         // SAFETY: as the caller's.
         unsafe { self.tile.compute::<S>(self.rings, self.windows) };
     }
@@ -435,7 +435,7 @@ impl Task for ChoicesTask<'_> {
     type Output = ();
 
     #[inline(always)]
-    unsafe fn run<S: Simd>(self) {
+    unsafe fn run<S: Groups>(self) {
         // SAFETY: as the caller's.
         unsafe { choices::row::<S>(self.even, self.row, self.choices) };
     }

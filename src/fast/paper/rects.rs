@@ -2,7 +2,7 @@
 
 use super::integrals::Counted;
 use crate::fast::arithmetic::Doubles;
-use crate::simd::{GROUP, Simd};
+use crate::simd::{GROUP, Groups};
 
 type Indices = [i32; GROUP];
 
@@ -45,7 +45,7 @@ impl Rects {
     /// # Safety
     /// The processor has the instruction set of `S`. Elements' indices are below 2^24.
     #[inline(always)]
-    pub unsafe fn new<S: Simd, const N: usize>(
+    pub unsafe fn new<S: Groups, const N: usize>(
         place: &Place,
         radii: S::F,
         inner: bool,
@@ -99,7 +99,7 @@ impl Rects {
     /// # Safety
     /// The processor has the instruction set of `S`; the corners lie in `sums`.
     #[inline(always)]
-    pub unsafe fn sums<S: Simd, const N: usize>(&self, sums: &[[f64; N]]) -> [Doubles<S>; N] {
+    pub unsafe fn sums<S: Groups, const N: usize>(&self, sums: &[[f64; N]]) -> [Doubles<S>; N] {
         const { assert!(N.is_multiple_of(4)) };
         debug_assert!(self.corners.iter().flatten().all(|at| (*at as usize) < N * sums.len()));
         let sums = sums.as_ptr().cast::<f64>();
@@ -153,7 +153,7 @@ impl Rects {
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-pub(crate) unsafe fn range<S: Simd>(at: S::F, radii: S::F, first: f32, size: f32) -> [S::F; 2] {
+pub(crate) unsafe fn range<S: Groups>(at: S::F, radii: S::F, first: f32, size: f32) -> [S::F; 2] {
     // SAFETY: as the caller's.
     unsafe {
         let end = S::add(S::add(at, radii), S::splat(1.0));
@@ -166,7 +166,7 @@ pub(crate) unsafe fn range<S: Simd>(at: S::F, radii: S::F, first: f32, size: f32
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn row_start<S: Simd>(place: &Place, row: S::F) -> S::F {
+unsafe fn row_start<S: Groups>(place: &Place, row: S::F) -> S::F {
     // SAFETY: as the caller's.
     unsafe {
         let rows = S::splat(place.rows as f32);
@@ -182,7 +182,7 @@ unsafe fn row_start<S: Simd>(place: &Place, row: S::F) -> S::F {
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn middle<S: Simd>(place: &Place, [start, end]: [S::F; 2]) -> S::F {
+unsafe fn middle<S: Groups>(place: &Place, [start, end]: [S::F; 2]) -> S::F {
     // SAFETY: as the caller's.
     unsafe {
         // Rounded down, also below zero.
@@ -195,7 +195,7 @@ unsafe fn middle<S: Simd>(place: &Place, [start, end]: [S::F; 2]) -> S::F {
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn store<S: Simd>(to: &mut Indices, value: S::F) {
+unsafe fn store<S: Groups>(to: &mut Indices, value: S::F) {
     // SAFETY: as the caller's.
     unsafe { S::store_i(to.as_mut_ptr(), S::truncate_i(value)) };
 }

@@ -13,7 +13,7 @@ use crate::methods::Estimate;
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
 use crate::paper::{CleanPoints, Cleaned, Rect, plain_estimate, window};
-use crate::simd::{GROUP, Simd};
+use crate::simd::{GROUP, Groups};
 
 /// A rectangle of the image whose normals are computed together.
 pub(crate) struct Tile<'a, F> {
@@ -36,7 +36,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
     /// # Safety
     /// The processor has the instruction set of `S`; no one else writes the tile's pixels.
     #[inline(always)]
-    pub unsafe fn compute<S: Simd, M: Sums<N>, const N: usize>(
+    pub unsafe fn compute<S: Groups, M: Sums<N>, const N: usize>(
         &self,
         method: &M,
         rings: &mut Rings<N>,
@@ -83,7 +83,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn row<S: Simd, M: Sums<N>, const N: usize>(
+    unsafe fn row<S: Groups, M: Sums<N>, const N: usize>(
         &self,
         rings: &Rings<N>,
         sink: &Sink,

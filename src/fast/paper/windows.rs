@@ -8,7 +8,7 @@
 use super::depths::row_length;
 use crate::fast::planes::grow;
 use crate::options::PaperOptions;
-use crate::simd::{GROUP, Simd};
+use crate::simd::{GROUP, Groups};
 
 /// More than any distance that matters; its square still fits a float exactly enough to stay the larger.
 const FAR: f32 = 1e6;
@@ -79,7 +79,7 @@ impl Sweep {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn radii<S: Simd>(&mut self, rows: &mut Rows, options: &PaperOptions) -> f32 {
+    pub unsafe fn radii<S: Groups>(&mut self, rows: &mut Rows, options: &PaperOptions) -> f32 {
         let length = row_length(rows.width);
         let margin = (reach(options) + AT_ONCE).next_multiple_of(GROUP);
         self.along.clear();
@@ -100,7 +100,7 @@ impl Sweep {
     /// # Safety
     /// As [`Sweep::radii`].
     #[inline(always)]
-    unsafe fn down<S: Simd>(&mut self, rows: &mut Rows, options: &PaperOptions) {
+    unsafe fn down<S: Groups>(&mut self, rows: &mut Rows, options: &PaperOptions) {
         let length = row_length(rows.width);
         let (first, end) = (rows.first, rows.first + rows.count);
         self.look_up(rows);
@@ -150,7 +150,7 @@ impl Sweep {
     /// # Safety
     /// As [`Sweep::radii`].
     #[inline(always)]
-    unsafe fn changes_to_right<S: Simd>(&mut self, depths: &[f32], options: &PaperOptions) {
+    unsafe fn changes_to_right<S: Groups>(&mut self, depths: &[f32], options: &PaperOptions) {
         let right = &mut self.right[..depths.len()];
         let mut before = 0;
         // SAFETY: as the caller's; a row of depths has a group behind its last one.
@@ -177,7 +177,7 @@ impl Sweep {
     /// # Safety
     /// As [`Sweep::radii`].
     #[inline(always)]
-    unsafe fn up<S: Simd>(
+    unsafe fn up<S: Groups>(
         &mut self,
         rows: &mut Rows,
         options: &PaperOptions,
@@ -238,7 +238,7 @@ fn mark_gap(depths: &[f32], at: usize, options: &PaperOptions, right: &mut [f32]
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn smallest_depth_change<S: Simd>(depth: S::F, options: &PaperOptions) -> S::F {
+unsafe fn smallest_depth_change<S: Groups>(depth: S::F, options: &PaperOptions) -> S::F {
     // SAFETY: as the caller's.
     unsafe { S::mul(S::mul(S::splat(options.alpha), depth), depth) }
 }
@@ -248,7 +248,7 @@ unsafe fn smallest_depth_change<S: Simd>(depth: S::F, options: &PaperOptions) ->
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn is_change<S: Simd>(
+unsafe fn is_change<S: Groups>(
     depth: S::F,
     neighbour: S::F,
     gap: S::F,
@@ -268,7 +268,7 @@ unsafe fn is_change<S: Simd>(
 /// # Safety
 /// The processor has the instruction set of `S`; `squares` is readable [`reach`] to both sides of the eight.
 #[inline(always)]
-unsafe fn radius<S: Simd>(
+unsafe fn radius<S: Groups>(
     depth: S::F,
     squares: *const f32,
     along: &[[f32; GROUP]],

@@ -1,0 +1,247 @@
+//! AVX-512: eight floats as with AVX2, eight doubles in one register, and pairs of groups in one or two.
+
+// Every block calls intrinsics of the instruction set that the trait's contract promises.
+#![allow(clippy::undocumented_unsafe_blocks)]
+
+use std::arch::x86_64::*;
+
+use super::twice::Twice;
+use super::x86::Avx2;
+use super::{GROUP, Groups, Simd};
+
+/// AVX-512 (F, VL, DQ, BW), on processors that have it.
+#[derive(Clone, Copy)]
+pub(crate) struct Avx512;
+
+/// Two of its groups: sixteen floats in one register.
+#[derive(Clone, Copy)]
+pub(crate) struct Avx512Pair;
+
+/// What a pair's doubles are.
+type TwoGroups = Twice<Avx512>;
+
+/// Methods that call one function each.
+macro_rules! calls {
+    ($($name:ident($($operand:ident: $type:ty),*) $(-> $result:ty)? = $function:path;)*) => {
+        $(#[inline(always)]
+        unsafe fn $name($($operand: $type),*) $(-> $result)? {
+            unsafe { $function($($operand),*) }
+        })*
+    };
+}
+
+impl Simd for Avx512 {
+    const LANES: usize = GROUP;
+    type F = __m256;
+    type I = __m256i;
+    type D = __m512d;
+
+    calls! {
+        splat(value: f32) -> Self::F = Avx2::splat;
+        load(from: *const f32) -> Self::F = Avx2::load;
+        store(to: *mut f32, value: Self::F) = Avx2::store;
+        add(a: Self::F, b: Self::F) -> Self::F = Avx2::add;
+        sub(a: Self::F, b: Self::F) -> Self::F = Avx2::sub;
+        mul(a: Self::F, b: Self::F) -> Self::F = Avx2::mul;
+        div(a: Self::F, b: Self::F) -> Self::F = Avx2::div;
+        sqrt(a: Self::F) -> Self::F = Avx2::sqrt;
+        min(a: Self::F, b: Self::F) -> Self::F = Avx2::min;
+        max(a: Self::F, b: Self::F) -> Self::F = Avx2::max;
+        lt(a: Self::F, b: Self::F) -> Self::F = Avx2::lt;
+        eq(a: Self::F, b: Self::F) -> Self::F = Avx2::eq;
+        and(a: Self::F, b: Self::F) -> Self::F = Avx2::and;
+        or(a: Self::F, b: Self::F) -> Self::F = Avx2::or;
+        xor(a: Self::F, b: Self::F) -> Self::F = Avx2::xor;
+        and_not(mask: Self::F, a: Self::F) -> Self::F = Avx2::and_not;
+        select(mask: Self::F, yes: Self::F, no: Self::F) -> Self::F = Avx2::select;
+        bits(mask: Self::F) -> u32 = Avx2::bits;
+
+        load_i(from: *const i32) -> Self::I = Avx2::load_i;
+        store_i(to: *mut i32, value: Self::I) = Avx2::store_i;
+        splat_i(value: i32) -> Self::I = Avx2::splat_i;
+        add_i(a: Self::I, b: Self::I) -> Self::I = Avx2::add_i;
+        sub_i(a: Self::I, b: Self::I) -> Self::I = Avx2::sub_i;
+        round_i(a: Self::F) -> Self::I = Avx2::round_i;
+        truncate_i(a: Self::F) -> Self::I = Avx2::truncate_i;
+        float_i(a: Self::I) -> Self::F = Avx2::float_i;
+
+        splat_d(value: f64) -> Self::D = _mm512_set1_pd;
+        load_d(from: *const f64) -> Self::D = _mm512_loadu_pd;
+        store_d(to: *mut f64, value: Self::D) = _mm512_storeu_pd;
+        add_d(a: Self::D, b: Self::D) -> Self::D = _mm512_add_pd;
+        sub_d(a: Self::D, b: Self::D) -> Self::D = _mm512_sub_pd;
+        mul_d(a: Self::D, b: Self::D) -> Self::D = _mm512_mul_pd;
+        div_d(a: Self::D, b: Self::D) -> Self::D = _mm512_div_pd;
+        max_d(a: Self::D, b: Self::D) -> Self::D = _mm512_max_pd;
+        widen(a: Self::F) -> Self::D = _mm512_cvtps_pd;
+        narrow(a: Self::D) -> Self::F = _mm512_cvtpd_ps;
+    }
+
+    #[inline(always)]
+    unsafe fn mask(bits: u32) -> Self::F {
+        unsafe { _mm256_castsi256_ps(_mm256_movm_epi32(bits as u8)) }
+    }
+    #[inline(always)]
+    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
+        unsafe { _mm256_mask_blend_epi32(lanes as u8, no, yes) }
+    }
+    #[inline(always)]
+    unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32 {
+        unsafe { u32::from(_mm512_cmp_pd_mask::<_CMP_LT_OQ>(a, b)) }
+    }
+    #[inline(always)]
+    unsafe fn select_bits_d(lanes: u32, yes: Self::D, no: Self::D) -> Self::D {
+        unsafe { _mm512_mask_blend_pd(lanes as u8, no, yes) }
+    }
+}
+
+impl Groups for Avx512 {
+    type Pair = Avx512Pair;
+
+    calls! {
+        load_halves(low: *const f32, high: *const f32) -> Self::F = Avx2::load_halves;
+        transpose_halves(rows: [Self::F; 4]) -> [Self::F; 4] = Avx2::transpose_halves;
+        prefix_sum_i(a: Self::I) -> Self::I = Avx2::prefix_sum_i;
+        last_i(a: Self::I) -> Self::I = Avx2::last_i;
+    }
+
+    #[inline(always)]
+    unsafe fn pair(first: Self::F, second: Self::F) -> __m512 {
+        unsafe { _mm512_insertf32x8::<1>(_mm512_castps256_ps512(first), second) }
+    }
+    #[inline(always)]
+    unsafe fn pair_i(first: Self::I, second: Self::I) -> __m512i {
+        unsafe { _mm512_inserti32x8::<1>(_mm512_castsi256_si512(first), second) }
+    }
+    #[inline(always)]
+    unsafe fn pair_d(first: Self::D, second: Self::D) -> [__m512d; 2] {
+        [first, second]
+    }
+    #[inline(always)]
+    unsafe fn groups(pair: __m512) -> [Self::F; 2] {
+        unsafe { [_mm512_castps512_ps256(pair), _mm512_extractf32x8_ps::<1>(pair)] }
+    }
+
+    #[inline(always)]
+    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
+        unsafe {
+            let low = _mm512_castpd256_pd512(_mm256_loadu_pd(low));
+            _mm512_insertf64x4::<1>(low, _mm256_loadu_pd(high))
+        }
+    }
+    #[inline(always)]
+    unsafe fn transpose_halves_d([a, b, c, d]: [Self::D; 4]) -> [Self::D; 4] {
+        unsafe {
+            let (ab_even, cd_even) = (_mm512_unpacklo_pd(a, b), _mm512_unpacklo_pd(c, d));
+            let (ab_odd, cd_odd) = (_mm512_unpackhi_pd(a, b), _mm512_unpackhi_pd(c, d));
+            // Lanes 0 and 1, or 2 and 3, of both halves of two registers.
+            let low = _mm512_setr_epi64(0, 1, 8, 9, 4, 5, 12, 13);
+            let high = _mm512_setr_epi64(2, 3, 10, 11, 6, 7, 14, 15);
+            [
+                _mm512_permutex2var_pd(ab_even, low, cd_even),
+                _mm512_permutex2var_pd(ab_odd, low, cd_odd),
+                _mm512_permutex2var_pd(ab_even, high, cd_even),
+                _mm512_permutex2var_pd(ab_odd, high, cd_odd),
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
+        unsafe {
+            // Among lanes 0 to 3 and 4 to 7 each gets the one before, then the one two before.
+            let a = _mm512_add_pd(a, _mm512_maskz_permutex_pd::<0b10_01_00_00>(0b1110_1110, a));
+            let a = _mm512_add_pd(a, _mm512_maskz_permutex_pd::<0b01_00_00_00>(0b1100_1100, a));
+            let low = _mm512_maskz_permutexvar_pd(0b1111_0000, _mm512_set1_epi64(3), a);
+            _mm512_add_pd(a, low)
+        }
+    }
+    #[inline(always)]
+    unsafe fn last_d(a: Self::D) -> Self::D {
+        unsafe { _mm512_permutexvar_pd(_mm512_set1_epi64(7), a) }
+    }
+}
+
+impl Simd for Avx512Pair {
+    const LANES: usize = 2 * GROUP;
+    type F = __m512;
+    type I = __m512i;
+    type D = [__m512d; 2];
+
+    calls! {
+        splat(value: f32) -> Self::F = _mm512_set1_ps;
+        load(from: *const f32) -> Self::F = _mm512_loadu_ps;
+        store(to: *mut f32, value: Self::F) = _mm512_storeu_ps;
+        add(a: Self::F, b: Self::F) -> Self::F = _mm512_add_ps;
+        sub(a: Self::F, b: Self::F) -> Self::F = _mm512_sub_ps;
+        mul(a: Self::F, b: Self::F) -> Self::F = _mm512_mul_ps;
+        div(a: Self::F, b: Self::F) -> Self::F = _mm512_div_ps;
+        sqrt(a: Self::F) -> Self::F = _mm512_sqrt_ps;
+        min(a: Self::F, b: Self::F) -> Self::F = _mm512_min_ps;
+        max(a: Self::F, b: Self::F) -> Self::F = _mm512_max_ps;
+        and(a: Self::F, b: Self::F) -> Self::F = _mm512_and_ps;
+        or(a: Self::F, b: Self::F) -> Self::F = _mm512_or_ps;
+        xor(a: Self::F, b: Self::F) -> Self::F = _mm512_xor_ps;
+        and_not(mask: Self::F, a: Self::F) -> Self::F = _mm512_andnot_ps;
+
+        splat_i(value: i32) -> Self::I = _mm512_set1_epi32;
+        add_i(a: Self::I, b: Self::I) -> Self::I = _mm512_add_epi32;
+        sub_i(a: Self::I, b: Self::I) -> Self::I = _mm512_sub_epi32;
+        round_i(a: Self::F) -> Self::I = _mm512_cvtps_epi32;
+        truncate_i(a: Self::F) -> Self::I = _mm512_cvttps_epi32;
+        float_i(a: Self::I) -> Self::F = _mm512_cvtepi32_ps;
+
+        splat_d(value: f64) -> Self::D = TwoGroups::splat_d;
+        load_d(from: *const f64) -> Self::D = TwoGroups::load_d;
+        store_d(to: *mut f64, value: Self::D) = TwoGroups::store_d;
+        add_d(a: Self::D, b: Self::D) -> Self::D = TwoGroups::add_d;
+        sub_d(a: Self::D, b: Self::D) -> Self::D = TwoGroups::sub_d;
+        mul_d(a: Self::D, b: Self::D) -> Self::D = TwoGroups::mul_d;
+        div_d(a: Self::D, b: Self::D) -> Self::D = TwoGroups::div_d;
+        max_d(a: Self::D, b: Self::D) -> Self::D = TwoGroups::max_d;
+        bits_lt_d(a: Self::D, b: Self::D) -> u32 = TwoGroups::bits_lt_d;
+        select_bits_d(lanes: u32, yes: Self::D, no: Self::D) -> Self::D = TwoGroups::select_bits_d;
+    }
+
+    #[inline(always)]
+    unsafe fn mask(bits: u32) -> Self::F {
+        unsafe { _mm512_castsi512_ps(_mm512_movm_epi32(bits as u16)) }
+    }
+    #[inline(always)]
+    unsafe fn bits(mask: Self::F) -> u32 {
+        unsafe { u32::from(_mm512_movepi32_mask(_mm512_castps_si512(mask))) }
+    }
+    #[inline(always)]
+    unsafe fn lt(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { Self::mask(u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b))) }
+    }
+    #[inline(always)]
+    unsafe fn eq(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { Self::mask(u32::from(_mm512_cmp_ps_mask::<_CMP_EQ_OQ>(a, b))) }
+    }
+    #[inline(always)]
+    unsafe fn select(mask: Self::F, yes: Self::F, no: Self::F) -> Self::F {
+        unsafe { _mm512_mask_blend_ps(Self::bits(mask) as u16, no, yes) }
+    }
+
+    #[inline(always)]
+    unsafe fn load_i(from: *const i32) -> Self::I {
+        unsafe { _mm512_loadu_si512(from.cast()) }
+    }
+    #[inline(always)]
+    unsafe fn store_i(to: *mut i32, value: Self::I) {
+        unsafe { _mm512_storeu_si512(to.cast(), value) }
+    }
+    #[inline(always)]
+    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
+        unsafe { _mm512_mask_blend_epi32(lanes as u16, no, yes) }
+    }
+
+    #[inline(always)]
+    unsafe fn widen(a: Self::F) -> Self::D {
+        unsafe { Avx512::groups(a).map(|group| Avx512::widen(group)) }
+    }
+    #[inline(always)]
+    unsafe fn narrow(a: Self::D) -> Self::F {
+        unsafe { Avx512::pair(Avx512::narrow(a[0]), Avx512::narrow(a[1])) }
+    }
+}

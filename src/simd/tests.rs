@@ -1,0 +1,218 @@
+//! Every instruction set's operations give what the portable ones give.
+
+use super::portable::Portable;
+use super::twice::Twice;
+use super::{GROUP, Groups, Simd};
+
+const FLOATS: [f32; 16] = [
+    0.0,
+    -0.0,
+    1.5,
+    -2.5,
+    0.1,
+    -7.3,
+    f32::NAN,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    f32::MIN_POSITIVE,
+    1e-41,
+    3.5,
+    123_456.7,
+    -1e30,
+    2.5,
+    1.0,
+];
+
+/// Sixteen floats each, of which every lane meets many values.
+fn floats() -> impl Iterator<Item = ([f32; 16], [f32; 16])> {
+    (0..16).flat_map(|i| {
+        (0..16).map(move |j| {
+            let a = std::array::from_fn(|l| FLOATS[(l + i) % 16]);
+            (a, std::array::from_fn(|l| FLOATS[(3 * l + j) % 16]))
+        })
+    })
+}
+
+/// What operations gave, lane by lane, as bits. NaN are one value: only their signs and payloads differ.
+#[derive(Debug, Default, PartialEq)]
+struct Results(Vec<u64>);
+
+impl Results {
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    unsafe fn floats<S: Simd>(&mut self, values: impl IntoIterator<Item = S::F>) {
+        for value in values {
+            let mut lanes = [0.0_f32; 2 * GROUP];
+            // SAFETY: as the caller's; there is room for a pair.
+            unsafe { S::store(lanes.as_mut_ptr(), value) };
+            let bits = |v: f32| if v.is_nan() { f32::NAN.to_bits() } else { v.to_bits() };
+            self.0.extend(lanes[..S::LANES].iter().map(|v| u64::from(bits(*v))));
+        }
+    }
+
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    unsafe fn integers<S: Simd>(&mut self, values: impl IntoIterator<Item = S::I>) {
+        for value in values {
+            let mut lanes = [0_i32; 2 * GROUP];
+            // SAFETY: as the caller's; there is room for a pair.
+            unsafe { S::store_i(lanes.as_mut_ptr(), value) };
+            self.0.extend(lanes[..S::LANES].iter().map(|v| *v as u64));
+        }
+    }
+
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    unsafe fn doubles<S: Simd>(&mut self, values: impl IntoIterator<Item = S::D>) {
+        for value in values {
+            let mut lanes = [0.0_f64; 2 * GROUP];
+            // SAFETY: as the caller's; there is room for a pair.
+            unsafe { S::store_d(lanes.as_mut_ptr(), value) };
+            let bits = |v: f64| if v.is_nan() { f64::NAN.to_bits() } else { v.to_bits() };
+            self.0.extend(lanes[..S::LANES].iter().map(|v| bits(*v)));
+        }
+    }
+}
+
+/// Those of two groups or pairs.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+unsafe fn of_lanes<S: Simd>(a: &[f32; 16], b: &[f32; 16]) -> Results {
+    let mut results = Results::default();
+    // SAFETY: as the caller's; no more than sixteen lanes are loaded.
+    unsafe {
+        let (x, y) = (S::load(a.as_ptr()), S::load(b.as_ptr()));
+        let bits = S::bits(S::lt(x, y));
+        let tenth = S::splat_d(0.1);
+        let (dx, dy) = (S::widen(x), S::widen(y));
+        results.floats::<S>([
+            S::add(x, y),
+            S::sub(x, y),
+            S::mul(x, y),
+            S::div(x, y),
+            S::sqrt(x),
+            S::min(x, y),
+            S::max(x, y),
+            S::and(x, y),
+            S::or(x, y),
+            S::xor(x, y),
+            S::and_not(x, y),
+            S::select(S::mask(bits), x, y),
+            S::abs(x),
+            S::finite(x),
+            S::narrow(S::mul_d(dx, tenth)),
+        ]);
+        let [i, j] = small::<S>([x, y]);
+        let mut loaded = [0_i32; 16];
+        S::store_i(loaded.as_mut_ptr(), i);
+        results.integers::<S>([
+            i,
+            j,
+            S::add_i(i, j),
+            S::sub_i(i, j),
+            S::select_i(bits, i, j),
+            S::load_i(loaded.as_ptr()),
+        ]);
+        results.floats::<S>([S::float_i(i)]);
+        let mut loaded = [0.0_f64; 16];
+        S::store_d(loaded.as_mut_ptr(), dy);
+        results.doubles::<S>([
+            dx,
+            S::add_d(dx, tenth),
+            S::sub_d(dx, dy),
+            S::mul_d(dx, dy),
+            S::div_d(dx, dy),
+            S::max_d(dx, dy),
+            S::select_bits_d(bits, dx, dy),
+            S::load_d(loaded.as_ptr()),
+        ]);
+        let masks = [bits, S::bits(S::eq(x, y)), S::bits_lt_d(dx, dy)];
+        results.0.extend(masks.map(u64::from));
+    }
+    results
+}
+
+/// What is only done with groups, and pairs made of them.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+unsafe fn of_groups<S: Groups>(a: &[f32; 16], b: &[f32; 16]) -> Results {
+    let mut results = Results::default();
+    // SAFETY: as the caller's; no more than sixteen lanes are loaded.
+    unsafe {
+        let (x, y) = (S::load(a.as_ptr()), S::load(b.as_ptr()));
+        let (dx, dy) = (S::widen(x), S::widen(y));
+        let [i, j] = small::<S>([x, y]);
+        let pair = S::pair(x, y);
+        results.floats::<S>([S::load_halves(b.as_ptr().add(3), a.as_ptr().add(1))]);
+        results.floats::<S>(S::transpose_halves([x, y, S::add(x, x), S::add(y, y)]));
+        results.floats::<S>(S::groups(pair));
+        results.integers::<S>([S::prefix_sum_i(i), S::last_i(i)]);
+        let doubles: [f64; 16] = std::array::from_fn(|l| f64::from(a[l]));
+        results.doubles::<S>([
+            S::load_halves_d(doubles.as_ptr().add(3), doubles.as_ptr().add(9)),
+            // A zero's sign may get lost.
+            S::add_d(
+                S::prefix_sum_d(S::mul_d(S::widen(S::float_i(i)), S::splat_d(0.1))),
+                S::splat_d(0.0),
+            ),
+            S::last_d(dx),
+        ]);
+        results.doubles::<S>(S::transpose_halves_d([dx, dy, S::add_d(dx, dx), S::add_d(dy, dy)]));
+        results.floats::<S::Pair>([pair]);
+        results.integers::<S::Pair>([S::pair_i(i, j)]);
+        results.doubles::<S::Pair>([S::pair_d(dx, dy)]);
+    }
+    results
+}
+
+/// Integers of numbers that fit, to the nearest and towards zero.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+unsafe fn small<S: Simd>(values: [S::F; 2]) -> [S::I; 2] {
+    // SAFETY: as the caller's.
+    unsafe {
+        let [x, y] = values.map(|v| S::select(S::lt(S::abs(v), S::splat(1e6)), v, S::splat(-0.5)));
+        [S::round_i(x), S::truncate_i(y)]
+    }
+}
+
+/// # Safety
+/// The processor has the instruction set of `S`.
+unsafe fn assert_as_portable<S: Groups>() {
+    for (a, b) in floats() {
+        // SAFETY: as the caller's, and the portable path runs everywhere.
+        unsafe {
+            assert_eq!(of_lanes::<S>(&a, &b), of_lanes::<Portable>(&a, &b), "{a:?} {b:?}");
+            assert_eq!(of_groups::<S>(&a, &b), of_groups::<Portable>(&a, &b), "{a:?} {b:?}");
+            let pairs = of_lanes::<S::Pair>(&a, &b);
+            assert_eq!(pairs, of_lanes::<Twice<Portable>>(&a, &b), "pairs of {a:?} {b:?}");
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[test]
+fn operations_of_x86_equal_the_portable_ones() {
+    use super::{avx512::Avx512, x86};
+    use crate::isa::Isa;
+    // SAFETY: SSE2 is part of every x86-64, and the others are there.
+    unsafe {
+        assert_as_portable::<x86::Sse2>();
+        if Isa::Avx2.is_available() {
+            assert_as_portable::<x86::Avx2>();
+        }
+        if Isa::Avx512.is_available() {
+            assert_as_portable::<Avx512>();
+        }
+    }
+}
+
+#[cfg(target_arch = "aarch64")]
+#[test]
+fn operations_of_neon_equal_the_portable_ones() {
+    // SAFETY: NEON is part of every 64-bit Arm.
+    unsafe { assert_as_portable::<super::neon::Neon>() };
+}
