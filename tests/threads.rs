@@ -166,7 +166,7 @@ fn a_frame_may_be_deeper_than_the_one_before() {
 /// The method that needs the most memory.
 const LARGEST_RINGS: (Method, BorderPolicy) = (Method::CovarianceMatrix, BorderPolicy::Ignore);
 
-/// At most 8 bytes a pixel and 48 rows of 96 bytes a pixel.
+/// At most 4 bytes a pixel and 48 rows of 96 bytes a pixel.
 #[test]
 fn scratch_memory_is_small_and_stays() {
     let sizes: &[(usize, usize)] = &[(64, 48), (640, 480), (4096, 3072)];
@@ -195,10 +195,10 @@ fn scratch_memory_is_small_and_stays() {
                     let (first, _) = frame();
                     let (second, allocations) = frame();
                     let rows =
-                        first.saturating_sub(8 * width * height) as f64 / (96 * width) as f64;
+                        first.saturating_sub(4 * width * height) as f64 / (96 * width) as f64;
                     println!(
                         "{width}x{height} {method:?} smoothing {smoothing} threads {threads}: {first} bytes, {:.2} \
-                         a pixel; beyond 8 a pixel {rows:.1} rows",
+                         a pixel; beyond 4 a pixel {rows:.1} rows",
                         first as f64 / (width * height) as f64,
                     );
                     if threads == 1 {
@@ -206,7 +206,7 @@ fn scratch_memory_is_small_and_stays() {
                         assert_eq!(allocations, 0, "{method:?}: the second frame allocates");
                     }
                     // A tile's rings have a least size, which in tiny frames is more than their rows.
-                    let most = 8 * width * height + 48 * width.max(640) * 96 * threads;
+                    let most = 4 * width * height + 48 * width.max(640) * 96 * threads;
                     assert!(first.max(second) <= most, "{method:?}: {first}, {second} > {most}");
                     estimator.release_scratch();
                     assert_eq!(estimator.scratch_size(), 0);

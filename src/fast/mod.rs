@@ -359,9 +359,10 @@ impl Task for SweepTask<'_> {
         let swept = (chunk.swept.start, chunk.swept.len());
         // SAFETY: as the caller's.
         unsafe {
-            let largest = windows.sweep_down::<S::Pair>(job.points, job.options, swept, sweep);
-            windows.sweep_up::<S::Pair>(job.points, job.options, swept, sweep);
-            largest
+            let depths = windows.sweep_down::<S::Pair>(job.points, job.options, swept, sweep);
+            windows.sweep_up::<S::Pair>(job.points, job.options, swept, depths, sweep);
+            let [least, largest] = depths;
+            largest.max(-least).max(0.0)
         }
     }
 }

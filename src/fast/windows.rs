@@ -8,7 +8,7 @@ use crate::cloud::Points;
 use crate::distance::{DIAGONAL, STRAIGHT, far};
 use crate::options::Options;
 use crate::simd::Simd;
-use crate::smoothing_area::{LARGEST, SMALLEST};
+use crate::smoothing_area::{LARGEST, SMALLEST, depth_smoothing};
 
 /// Rows of a map in lane order, each between two elements that hold the neighbouring segments' ends. After the
 /// upward sweep the rows hold the sides of windows instead, pixel by pixel.
@@ -20,12 +20,8 @@ pub(crate) struct WindowRows<'a> {
 /// What the sweeps need beside the map.
 #[derive(Debug, Default)]
 pub(crate) struct Sweep {
-    /// Rows of depths in lane order, each with an element more for the following segments' first pixels: all that are
-    /// swept if the upward sweep needs them again, else a ring of two.
+    /// A ring of two rows of depths in lane order, each with an element more for the following segments' first pixels.
     z: Vec<Lanes>,
-    /// Rows in `z`, and the image's row that is the first in it.
-    z_rows: usize,
-    z_first: usize,
     /// Masks: where the pixel has a right neighbour, and where there is a depth change from the one above.
     tested: Vec<Lanes>,
     above: Vec<Lanes>,
@@ -33,15 +29,14 @@ pub(crate) struct Sweep {
 }
 
 impl Sweep {
-    fn resize(&mut self, order: LaneOrder, z_rows: usize, z_first: usize) {
-        (self.z_rows, self.z_first) = (z_rows, z_first);
+    fn resize(&mut self, order: LaneOrder) {
         let length = order.segment + 1;
         let grow = |rows: &mut Vec<Lanes>, count: usize| {
             if rows.len() < count {
                 rows.resize(count, Lanes::ZERO);
             }
         };
-        grow(&mut self.z, z_rows * length);
+        grow(&mut self.z, 2 * length);
         grow(&mut self.above, length);
         grow(&mut self.sides, length);
         self.above.fill(Lanes::ZERO);
@@ -54,19 +49,19 @@ impl Sweep {
     }
 
     /// Where row `y` of the depths lies in `z`.
-    fn z_place(&self, order: LaneOrder, y: usize) -> Range<usize> {
+    fn z_place(order: LaneOrder, y: usize) -> Range<usize> {
         let length = order.segment + 1;
-        let start = (y - self.z_first) % self.z_rows * length;
+        let start = y % 2 * length;
         start..start + length
     }
 
-    /// Reads a row's depths.
+    /// Reads a row's depths; `next` is the one to be read after it.
     #[inline(always)]
-    fn read_z(&mut self, points: &Points, order: LaneOrder, y: usize) {
-        let place = self.z_place(order, y);
+    fn read_z(&mut self, points: &Points, order: LaneOrder, y: usize, next: usize) {
+        let place = Self::z_place(order, y);
         let z = &mut self.z[place];
         let (row, stride) = points.z_row(y);
-        points.prefetch(y + 1, 0..order.width);
+        points.prefetch(next, 0..order.width);
         // SAFETY: row y is inside the cloud, so it has a depth at every x below the width.
         unsafe { order.read(row, stride, z) };
         z[order.segment] = z[0].previous_lane(0.0);
@@ -103,8 +98,8 @@ impl<'a> WindowRows<'a> {
         self.rows[index * length..(index + 2) * length].split_at_mut(length)
     }
 
-    /// Depth changes and the forward pass over the image's rows `first..first + count`, downwards. Returns the largest
-    /// magnitude of a finite depth in them.
+    /// Depth changes and the forward pass over the image's rows `first..first + count`, downwards. Returns the least
+    /// and the largest finite depth in them, infinity and -infinity if there is none.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`, which has sixteen lanes.
@@ -115,19 +110,18 @@ impl<'a> WindowRows<'a> {
         options: &Options,
         (first, count): (usize, usize),
         sweep: &mut Sweep,
-    ) -> f32 {
+    ) -> [f32; 2] {
         let order = self.order;
-        let z_rows = if options.depth_dependent_smoothing { count + 2 } else { 2 };
         let before = first.saturating_sub(1);
-        sweep.resize(order, z_rows, before);
+        sweep.resize(order);
         let factor = options.max_depth_change_factor;
         let far = far(points.width(), points.height());
-        sweep.read_z(points, order, before);
-        let mut largest = Lanes::ZERO;
+        sweep.read_z(points, order, before, before + 1);
+        let mut depths = [Lanes([f32::INFINITY; LANES]), Lanes([f32::NEG_INFINITY; LANES])];
         for y in before..first + count {
             let last = y + 1 == points.height();
             if !last {
-                sweep.read_z(points, order, y + 1);
+                sweep.read_z(points, order, y + 1, y + 2);
             }
             // The row before the first is only tested against the first.
             let index = (y + 1).saturating_sub(first + 1);
@@ -135,9 +129,9 @@ impl<'a> WindowRows<'a> {
             // SAFETY: as the caller's.
             unsafe {
                 if last {
-                    sweep.start_last_row::<S>(order, y, far, row, &mut largest);
+                    sweep.start_last_row::<S>(order, y, far, row, &mut depths);
                 } else {
-                    sweep.start_row::<S>(order, y, factor, far, row, &mut largest);
+                    sweep.start_row::<S>(order, y, factor, far, row, &mut depths);
                 }
                 if y > first {
                     let (above, row) = self.two_rows(index - 1);
@@ -146,11 +140,15 @@ impl<'a> WindowRows<'a> {
             }
             close_ends(self.row(index), far);
         }
-        largest.0.into_iter().fold(0.0, f32::max)
+        let [least, largest] = depths;
+        [
+            least.0.into_iter().fold(f32::INFINITY, f32::min),
+            largest.0.into_iter().fold(f32::NEG_INFINITY, f32::max),
+        ]
     }
 
     /// The backward pass upwards over the swept rows, `first` being the image's row of the first; then the rows
-    /// hold the sides of their windows.
+    /// hold the sides of their windows. `depths` are the least and the largest finite depth.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`, which has sixteen lanes.
@@ -160,10 +158,12 @@ impl<'a> WindowRows<'a> {
         points: &Points,
         options: &Options,
         (first, count): (usize, usize),
+        depths: [f32; 2],
         sweep: &mut Sweep,
     ) {
         let order = self.order;
         let far = far(points.width(), points.height());
+        let smoothing = one_smoothing(depths, options);
         for index in (0..count).rev() {
             if index + 1 < count {
                 let (row, below) = self.two_rows(index);
@@ -171,11 +171,13 @@ impl<'a> WindowRows<'a> {
                 unsafe { backward::<S>(order, row, below, far) };
                 close_ends(row, far);
                 // SAFETY: as the caller's.
-                unsafe { sweep.sides::<S>(points, options, first + index + 1, order, below) };
+                unsafe {
+                    sweep.sides::<S>(points, options, smoothing, first + index + 1, order, below)
+                };
             }
         }
         // SAFETY: as the caller's.
-        unsafe { sweep.sides::<S>(points, options, first, order, self.row(0)) };
+        unsafe { sweep.sides::<S>(points, options, smoothing, first, order, self.row(0)) };
     }
 }
 
@@ -198,7 +200,7 @@ fn floats_mut(row: &mut [Lanes]) -> &mut [f32] {
 
 impl Sweep {
     /// Depth changes of row `y`, from its depths and those of the next row: distance 0 at depth changes, `far`
-    /// elsewhere. Keeps the changes to the row below for the next row, and the largest magnitudes of finite depths.
+    /// elsewhere. Keeps the changes to the row below for the next row, and the least and largest finite depths.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`, which has sixteen lanes.
@@ -210,10 +212,10 @@ impl Sweep {
         factor: f32,
         far: f32,
         row: &mut [Lanes],
-        largest: &mut Lanes,
+        depths: &mut [Lanes; 2],
     ) {
         let segment = order.segment;
-        let (own, next) = (self.z_place(order, y), self.z_place(order, y + 1));
+        let (own, next) = (Self::z_place(order, y), Self::z_place(order, y + 1));
         let (z, below) = (&self.z[own], &self.z[next]);
         let (tested, above) = (&self.tested[..segment], &mut self.above[..segment]);
         let row = &mut row[..segment];
@@ -221,7 +223,7 @@ impl Sweep {
         unsafe {
             let far = S::splat(far);
             let factor = S::splat(factor);
-            let mut most = largest.load::<S>();
+            let mut range = depths.map(|depth| depth.load::<S>());
             let end = z[segment - 1].load::<S>();
             let end_right = z[segment].load::<S>();
             let bound = threshold::<S>(end, factor);
@@ -235,7 +237,7 @@ impl Sweep {
                 let (lower, upper) = (below[k].load::<S>(), above[k].load::<S>());
                 let tested = tested[k].load::<S>();
                 let finite = S::finite(own);
-                most = S::max(S::and(finite, S::abs(own)), most);
+                range = widened::<S>(range, own, finite);
                 let bound = threshold::<S>(own, factor);
                 let to_right = S::and(is_change::<S>(own, finite, right, bound), tested);
                 let to_lower = S::and(is_change::<S>(own, finite, lower, bound), tested);
@@ -245,7 +247,8 @@ impl Sweep {
                 left = to_right;
                 own = right;
             }
-            largest.store::<S>(most);
+            depths[0].store::<S>(range[0]);
+            depths[1].store::<S>(range[1]);
         }
     }
 
@@ -260,55 +263,60 @@ impl Sweep {
         y: usize,
         far: f32,
         row: &mut [Lanes],
-        largest: &mut Lanes,
+        depths: &mut [Lanes; 2],
     ) {
-        let z = &self.z[self.z_place(order, y)];
+        let z = &self.z[Self::z_place(order, y)];
         // SAFETY: as the caller's.
         unsafe {
-            let mut most = largest.load::<S>();
+            let mut range = depths.map(|depth| depth.load::<S>());
             for k in 0..order.segment {
                 let (above, own) = (self.above[k].load::<S>(), z[k].load::<S>());
                 row[k].store::<S>(S::and_not(above, S::splat(far)));
-                most = S::max(S::and(S::finite(own), S::abs(own)), most);
+                range = widened::<S>(range, own, S::finite(own));
             }
-            largest.store::<S>(most);
+            depths[0].store::<S>(range[0]);
+            depths[1].store::<S>(range[1]);
         }
     }
 
-    /// Replaces a row's distances by the sides of its windows, pixel by pixel.
+    /// Replaces a row's distances by the sides of its windows, pixel by pixel. `smoothing` as [`one_smoothing`] says.
     ///
     /// # Safety
-    /// As [`Sweep::test_below`].
+    /// As [`Sweep::start_row`].
     #[inline(always)]
     unsafe fn sides<S: Simd>(
         &mut self,
         points: &Points,
         options: &Options,
+        smoothing: Option<f32>,
         y: usize,
         order: LaneOrder,
         row: &mut [Lanes],
     ) {
         let segment = order.segment;
-        let place = self.z_place(order, y);
-        let (distances, z, sides) = (&row[1..=segment], &self.z[place], &mut self.sides[..segment]);
+        if smoothing.is_none() {
+            self.read_z(points, order, y, y.wrapping_sub(1));
+        }
+        let z = &self.z[Self::z_place(order, y)];
+        let (distances, sides) = (&row[1..=segment], &mut self.sides[..segment]);
         // SAFETY: as the caller's; the sides fit i32.
         unsafe {
-            let size = S::splat(options.normal_smoothing_size);
-            let ten = S::splat(10.0);
             let side = |distance, smoothing| {
                 let smallest = S::min(distance, smoothing);
                 let whole = S::truncate(S::min(smallest, S::splat(LARGEST)));
                 S::and(S::lt(S::splat(SMALLEST), smallest), whole)
             };
-            for k in 0..segment {
-                let distances = distances[k].load::<S>();
-                let z = z[k].load::<S>();
-                let smoothing = if options.depth_dependent_smoothing {
-                    S::add(size, S::div(z, ten))
-                } else {
-                    size
-                };
-                sides[k].store::<S>(side(distances, smoothing));
+            if let Some(smoothing) = smoothing {
+                let smoothing = S::splat(smoothing);
+                for k in 0..segment {
+                    sides[k].store::<S>(side(distances[k].load::<S>(), smoothing));
+                }
+            } else {
+                let (size, ten) = (S::splat(options.normal_smoothing_size), S::splat(10.0));
+                for k in 0..segment {
+                    let smoothing = S::add(size, S::div(z[k].load::<S>(), ten));
+                    sides[k].store::<S>(side(distances[k].load::<S>(), smoothing));
+                }
             }
         }
         let row = floats_mut(row);
@@ -323,6 +331,28 @@ impl Sweep {
         }
         row[..border].fill(0.0);
         row[order.width - border..order.width].fill(0.0);
+    }
+}
+
+/// What every pixel may be smoothed as far as, if depths from the least to the largest make no difference: only the
+/// whole part counts, and whether it is enough for a window.
+fn one_smoothing([least, largest]: [f32; 2], options: &Options) -> Option<f32> {
+    let [first, last] = [least, largest].map(|z| depth_smoothing(z, options));
+    let alike = |a: f32, b: f32| a.trunc() == b.trunc() && (a > SMALLEST) == (b > SMALLEST);
+    (least > largest || alike(first, last)).then_some(first)
+}
+
+/// The range of depths with another one, if it is finite.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn widened<S: Simd>([least, largest]: [S::F; 2], z: S::F, finite: S::F) -> [S::F; 2] {
+    // SAFETY: as the caller's.
+    unsafe {
+        // A NaN is neither smaller nor larger.
+        let z = S::or(S::and_not(finite, S::splat(f32::NAN)), z);
+        [S::min(z, least), S::max(z, largest)]
     }
 }
 
@@ -470,6 +500,8 @@ mod tests {
     use crate::simd::{portable::Portable, twice::Twice};
     use crate::smoothing_area::window_side;
 
+    type S = Twice<Portable>;
+
     /// Depths with steps and holes, the same for the same seed.
     fn depths(width: usize, height: usize, seed: u32) -> Vec<f32> {
         let mut state = seed.wrapping_mul(2_654_435_761) | 1;
@@ -496,7 +528,8 @@ mod tests {
                 let z = depths(width, height, seed * 1000 + width as u32);
                 let points = Points::planes([&z, &z, &z], width, height, 0).unwrap();
                 let options = Options {
-                    normal_smoothing_size: 9.5,
+                    // With the last, depths decide.
+                    normal_smoothing_size: if seed == 4 { 9.8 } else { 9.5 },
                     border_policy: crate::BorderPolicy::Mirror,
                     depth_dependent_smoothing: seed % 2 == 0,
                     ..Options::default()
@@ -507,15 +540,11 @@ mod tests {
                 let mut rows = vec![Lanes::ZERO; row_length(width) * height];
                 let mut windows = WindowRows::new(width, &mut rows);
                 let mut sweep = Sweep::default();
+                let swept = (0, height);
                 // SAFETY: the portable path runs everywhere.
                 unsafe {
-                    windows.sweep_down::<Twice<Portable>>(
-                        &points,
-                        &options,
-                        (0, height),
-                        &mut sweep,
-                    );
-                    windows.sweep_up::<Twice<Portable>>(&points, &options, (0, height), &mut sweep);
+                    let depths = windows.sweep_down::<S>(&points, &options, swept, &mut sweep);
+                    windows.sweep_up::<S>(&points, &options, swept, depths, &mut sweep);
                 }
                 for y in 0..height {
                     for x in 0..width {
