@@ -323,12 +323,15 @@ pub(crate) struct PointRow<'a> {
 }
 
 impl PointRow<'_> {
-    /// x, y and z of eight points from the `at`-th on; zeros for those behind the last.
+    /// x, y and z of eight points from the `at`-th on; zeros for those behind the last. Asks for those two rows below,
+    /// as rows are read downwards.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     pub unsafe fn group<S: Groups>(&self, at: usize) -> [S::F; 3] {
+        let column = self.columns.start + at;
+        self.points.prefetch(self.y + 2, column..column + GROUP);
         // SAFETY: as the caller's; eight points are inside the row, and of those that are read whole none is its last.
         unsafe {
             if at + GROUP <= self.whole {

@@ -157,11 +157,9 @@ impl Sums for HalfWindows {
         first: Self::OfLanes<S>,
         second: Self::OfLanes<S>,
     ) -> Self::OfLanes<S::Pair> {
-        // SAFETY: there are groups, so there is the instruction set.
-        let both = |a: Floats<S>, b: Floats<S>| Floats(unsafe { S::pair(a.0, b.0) });
         let [[a, b, c], [d, e, f]] = first;
         let [[g, h, i], [j, k, l]] = second;
-        [[both(a, g), both(b, h), both(c, i)], [both(d, j), both(e, k), both(f, l)]]
+        [[a.pair(g), b.pair(h), c.pair(i)], [d.pair(j), e.pair(k), f.pair(l)]]
     }
 
     #[inline(always)]

@@ -198,13 +198,11 @@ impl Sums for Moments {
         first: Self::OfLanes<S>,
         second: Self::OfLanes<S>,
     ) -> Self::OfLanes<S::Pair> {
-        // SAFETY: there are groups, so there is the instruction set.
-        let both = |a: Doubles<S>, b: Doubles<S>| Doubles(unsafe { S::pair_d(a.0, b.0) });
-        let mut sums = [both(first.sums[0], second.sums[0]); CHANNELS];
+        let mut sums = [first.sums[0].pair(second.sums[0]); CHANNELS];
         for c in 1..CHANNELS {
-            sums[c] = both(first.sums[c], second.sums[c]);
+            sums[c] = first.sums[c].pair(second.sums[c]);
         }
-        WindowMoments { sums, share: both(first.share, second.share) }
+        WindowMoments { sums, share: first.share.pair(second.share) }
     }
 
     #[inline(always)]

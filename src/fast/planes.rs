@@ -153,7 +153,7 @@ impl Planes {
         let start = frame.start(3, y);
         let row = &mut self.data[start..start + 3 * frame.stride];
         assert!(MARGIN + (frame.groups() + 1) * GROUP <= frame.stride);
-        let from = points.row(y, frame.columns.clone(), whole_points);
+        let points = points.row(y, frame.columns.clone(), whole_points);
         let xs = row[MARGIN..].as_mut_ptr();
         // SAFETY: as the caller's; the groups, and one of zeros behind them, lie inside the planes.
         unsafe {
@@ -162,9 +162,7 @@ impl Planes {
             let mut largest = S::splat(0.0);
             for group in 0..frame.groups() + 1 {
                 let at = group * GROUP;
-                let first = frame.columns.start + at;
-                points.prefetch(y + 2, first..first + GROUP);
-                let [x, y, z] = from.group::<S>(at);
+                let [x, y, z] = points.group::<S>(at);
                 let finite_z = S::finite(z);
                 let finite = S::and(finite_z, S::and(S::finite(x), S::finite(y)));
                 hidden = S::or(hidden, S::and_not(finite, finite_z));
