@@ -271,18 +271,10 @@ impl<'a> Points<'a> {
     /// coming where rows are read in pieces.
     #[inline(always)]
     pub(crate) fn prefetch(&self, y: usize, columns: Range<usize>) {
-        #[cfg(target_arch = "x86_64")]
         if y < self.grid.height {
-            use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-            let (start, end) =
-                (self.grid.offset(columns.start, y), self.grid.offset(columns.end, y));
-            for line in (start..end).step_by(LINE) {
-                // SAFETY: a prefetch reads and writes nothing, whatever the address.
-                unsafe { _mm_prefetch::<_MM_HINT_T0>(self.z.wrapping_byte_add(line).cast()) };
-            }
+            let start = self.grid.offset(columns.start, y);
+            prefetch(self.z.wrapping_byte_add(start), columns.len() * self.grid.point_stride);
         }
-        #[cfg(not(target_arch = "x86_64"))]
-        let _ = (y, columns);
     }
 
     /// Whether the 16 bytes from a point's x are part of the same cloud, and of nothing that `normals` writes, for
@@ -306,7 +298,9 @@ impl<'a> Points<'a> {
         let step = self.grid.point_stride;
         let inside = columns.end.min(self.grid.width - 1).saturating_sub(columns.start);
         let whole = if whole_points { inside } else { 0 };
-        PointRow { points: self, y, columns, first: self.x.wrapping_byte_add(offset), step, whole }
+        let below = if y + 2 < self.grid.height { 2 * self.grid.row_stride } else { 0 };
+        let first = self.x.wrapping_byte_add(offset);
+        PointRow { points: self, y, columns, first, step, below, whole }
     }
 }
 
@@ -315,9 +309,10 @@ pub(crate) struct PointRow<'a> {
     points: &'a Points<'a>,
     y: usize,
     columns: Range<usize>,
-    /// The first point's x, and the bytes to the next one's.
+    /// The first point's x, and the bytes to the next one's and to that two rows below.
     first: *const f32,
     step: usize,
+    below: usize,
     /// How many of them can be read whole.
     whole: usize,
 }
@@ -330,8 +325,7 @@ impl PointRow<'_> {
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     pub unsafe fn group<S: Groups>(&self, at: usize) -> [S::F; 3] {
-        let column = self.columns.start + at;
-        self.points.prefetch(self.y + 2, column..column + GROUP);
+        prefetch(self.first.wrapping_byte_add(self.below + at * self.step), GROUP * self.step);
         // SAFETY: as the caller's; eight points are inside the row, and of those that are read whole none is its last.
         unsafe {
             if at + GROUP <= self.whole {
@@ -504,6 +498,19 @@ impl<'a> Normals<'a> {
             }
         }
     }
+}
+
+/// Asks for the cache lines of so many bytes.
+#[inline(always)]
+fn prefetch(at: *const f32, bytes: usize) {
+    #[cfg(target_arch = "x86_64")]
+    for line in (0..bytes).step_by(LINE) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: a prefetch reads and writes nothing, whatever the address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(at.wrapping_byte_add(line).cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (at, bytes);
 }
 
 /// Asks for the cache lines that will be written a few groups later: normals are so far apart that stores would wait
