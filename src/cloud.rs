@@ -267,13 +267,12 @@ impl<'a> Points<'a> {
         (unsafe { self.z.byte_add(y * self.grid.row_stride) }, self.grid.point_stride)
     }
 
-    /// Asks for the cache lines of row `y`, if there is one, in `columns`: the hardware does not see the next row
-    /// coming where rows are read in pieces.
+    /// Asks for the cache lines of row `y`, if there is one: the hardware does not see the next row coming where rows
+    /// are read in pieces.
     #[inline(always)]
-    pub(crate) fn prefetch(&self, y: usize, columns: Range<usize>) {
+    pub(crate) fn prefetch_row(&self, y: usize) {
         if y < self.grid.height {
-            let start = self.grid.offset(columns.start, y);
-            prefetch(self.z.wrapping_byte_add(start), columns.len() * self.grid.point_stride);
+            prefetch(self.z_row(y).0, self.grid.width * self.grid.point_stride);
         }
     }
 

@@ -283,8 +283,8 @@ impl Sums for Moments {
 }
 
 /// The eigenvector of the smallest eigenvalue: the least root of the characteristic polynomial in closed form, made
-/// precise by Newton steps, then a column of the adjugate. `error` is what the rounding errors of
-/// the sums of all but `fresh` lanes stay below; other lanes than `lanes` mean nothing.
+/// precise by Newton steps, then a column of the adjugate. `error` is what the rounding errors of the sums of all but
+/// `fresh` lanes stay below; other lanes than `lanes` mean nothing.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.

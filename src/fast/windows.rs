@@ -4,6 +4,7 @@
 use std::ops::Range;
 
 use super::lanes::{LANES, LaneOrder, Lanes};
+use super::planes::grow;
 use crate::cloud::Points;
 use crate::distance::{DIAGONAL, STRAIGHT, far};
 use crate::options::Options;
@@ -31,11 +32,6 @@ pub(crate) struct Sweep {
 impl Sweep {
     fn resize(&mut self, order: LaneOrder) {
         let length = order.segment + 1;
-        let grow = |rows: &mut Vec<Lanes>, count: usize| {
-            if rows.len() < count {
-                rows.resize(count, Lanes::ZERO);
-            }
-        };
         grow(&mut self.z, 2 * length);
         grow(&mut self.above, length);
         grow(&mut self.sides, length);
@@ -61,7 +57,7 @@ impl Sweep {
         let place = Self::z_place(order, y);
         let z = &mut self.z[place];
         let (row, stride) = points.z_row(y);
-        points.prefetch(next, 0..order.width);
+        points.prefetch_row(next);
         // SAFETY: row y is inside the cloud, so it has a depth at every x below the width.
         unsafe { order.read(row, stride, z) };
         z[order.segment] = z[0].previous_lane(0.0);
