@@ -1,7 +1,8 @@
 //! Sums of half windows of z, for AVERAGE_DEPTH_CHANGE: the paper's one integral image, in f64.
 
 use super::arithmetic::{Doubles, Floats, cross, dot};
-use super::planes::{Corners, Frame, MARGIN, Planes, grow, sum_between};
+use super::buffer::Buffer;
+use super::planes::{Corners, Frame, MARGIN, Planes, sum_between};
 use super::tile::{Found, Sums};
 use crate::paper::refill;
 use crate::simd::{GROUP, Groups, Simd};
@@ -10,7 +11,7 @@ use crate::window::Image;
 /// The ring of integral rows of z.
 #[derive(Debug, Default)]
 pub(crate) struct HalfWindows {
-    integrals: Vec<f64>,
+    integrals: Buffer<f64>,
     last: Option<usize>,
     /// By the side of a window.
     places: Vec<Places>,
@@ -66,12 +67,12 @@ impl Sums for HalfWindows {
     const CURVATURE: bool = false;
 
     fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, _origin: [f32; 3]) {
-        grow(&mut self.integrals, frame.ring * frame.stride);
+        self.integrals.grow(frame.ring * frame.stride);
         self.last = None;
     }
 
     fn size(&self) -> usize {
-        self.integrals.capacity() * size_of::<f64>() + self.places.capacity() * size_of::<Places>()
+        self.integrals.size() + self.places.capacity() * size_of::<Places>()
     }
 
     #[inline(always)]

@@ -4,6 +4,7 @@
 //! k of every segment. So the serial chain along a row that a distance transform needs runs in 16 lanes at once,
 //! and the pixel's neighbours in the rows above and below lie at elements k - 1, k, k + 1.
 
+use super::buffer::Number;
 use crate::simd::{GROUP, Simd};
 
 pub(crate) const LANES: usize = 2 * GROUP;
@@ -12,6 +13,9 @@ pub(crate) const LANES: usize = 2 * GROUP;
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 pub(crate) struct Lanes(pub [f32; LANES]);
+
+// SAFETY: an array of floats, aligned like a line.
+unsafe impl Number for Lanes {}
 
 impl Lanes {
     pub const ZERO: Lanes = Lanes([0.0; LANES]);

@@ -5,6 +5,7 @@
 //! so that results do not depend on the number of threads.
 
 mod arithmetic;
+mod buffer;
 mod half_windows;
 mod lanes;
 mod moments;
@@ -20,6 +21,7 @@ use std::ops::{Range, RangeInclusive};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use buffer::Buffer;
 use half_windows::HalfWindows;
 use lanes::Lanes;
 use moments::Moments;
@@ -57,7 +59,7 @@ const DEEPER: f32 = 1.25;
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     workers: Workers,
-    rows: Vec<Lanes>,
+    rows: Buffer<Lanes>,
     each: Vec<Mutex<WorkerScratch>>,
     listed: Vec<(u32, u32)>,
     chunks: Vec<Chunk>,
@@ -90,7 +92,7 @@ impl Scratch {
     /// Bytes held.
     pub fn size(&self) -> usize {
         let each = self.each.iter().map(|scratch| lock(scratch).size()).sum::<usize>();
-        self.rows.capacity() * size_of::<Lanes>()
+        self.rows.size()
             + self.listed.capacity() * size_of::<(u32, u32)>()
             + self.chunks.capacity() * size_of::<Chunk>()
             + self.paper.size()
@@ -168,7 +170,7 @@ pub(crate) fn compute(
     let (limit, swept) = loop {
         share_out(height, count, reach, chunks);
         let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
-        reserve(rows, swept * length, Lanes::ZERO)?;
+        rows.try_grow(swept * length)?;
         let limit = job.sweep(workers, each, chunks, &mut rows[..swept * length]);
         if chunks.len() == 1 || job.reach(limit) <= reach {
             break (limit, swept);
@@ -203,15 +205,6 @@ pub(crate) fn compute_with_sides(
     compute(isa, points, options, None, normals, scratch)?;
     let width = points.width();
     read_map(&scratch.chunks, found, |place| &sides(&scratch.rows, width, place)[..width]);
-    Ok(())
-}
-
-/// Grows a buffer to `length` elements.
-fn reserve<T: Clone>(rows: &mut Vec<T>, length: usize, zero: T) -> Result<(), Error> {
-    if rows.len() < length {
-        rows.try_reserve(length - rows.len()).map_err(|_| Error::OutOfMemory)?;
-        rows.resize(length, zero);
-    }
     Ok(())
 }
 

@@ -2,7 +2,8 @@
 //! about a point of the tile.
 
 use super::arithmetic::{Doubles, Floats, dot};
-use super::planes::{Corners, Frame, MARGIN, Planes, grow, sum_between};
+use super::buffer::Buffer;
+use super::planes::{Corners, Frame, MARGIN, Planes, sum_between};
 use super::tile::{Found, Sums};
 use crate::cloud::Points;
 use crate::paper::{ROUNDING, refill};
@@ -15,9 +16,9 @@ const CHANNELS: usize = 9;
 /// The ring of integral rows: nine planes a row.
 #[derive(Debug, Default)]
 pub(crate) struct Moments {
-    integrals: Vec<f64>,
+    integrals: Buffer<f64>,
     /// The row pushed last, less the origin.
-    centered: Vec<f64>,
+    centered: Buffer<f64>,
     origin: [f32; 3],
     /// The place of the row pushed last; before the first the one after the ring, which is zero.
     last: usize,
@@ -97,15 +98,16 @@ impl Sums for Moments {
 
     fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, origin: [f32; 3]) {
         let zero = Self::start_of(frame, frame.ring)..Self::start_of(frame, frame.ring + 1);
-        grow(&mut self.integrals, zero.end);
+        self.integrals.grow(zero.end);
         self.integrals[zero].fill(0.0);
-        grow(&mut self.centered, 3 * frame.stride);
+        self.centered.grow(3 * frame.stride);
         self.origin = origin;
         self.last = frame.ring;
     }
 
     fn size(&self) -> usize {
-        (self.integrals.capacity() + self.centered.capacity()) * size_of::<f64>()
+        self.integrals.size()
+            + self.centered.size()
             + self.places.capacity() * size_of::<(Corners, f64)>()
     }
 

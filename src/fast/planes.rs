@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::arithmetic::Doubles;
+use super::buffer::Buffer;
 use crate::cloud::Points;
 use crate::simd::{GROUP, Groups, Simd};
 
@@ -87,17 +88,10 @@ pub(crate) unsafe fn sum_between<S: Simd>(ring: *const f64, corners: &Corners) -
     }
 }
 
-/// Grows a buffer to `length` without touching what is there.
-pub(crate) fn grow<T: Copy + Default>(buffer: &mut Vec<T>, length: usize) {
-    if buffer.len() < length {
-        buffer.resize(length, T::default());
-    }
-}
-
 /// The ring of x, y and z rows. Points that miss a coordinate are (0, 0, 0).
 #[derive(Debug, Default)]
 pub(crate) struct Planes {
-    data: Vec<f32>,
+    data: Buffer<f32>,
 }
 
 /// What a row of points was like.
@@ -111,11 +105,11 @@ pub(crate) struct RowNews {
 
 impl Planes {
     pub fn resize(&mut self, frame: &Frame) {
-        grow(&mut self.data, 3 * frame.ring * frame.stride);
+        self.data.grow(3 * frame.ring * frame.stride);
     }
 
     pub fn size(&self) -> usize {
-        self.data.capacity() * size_of::<f32>()
+        self.data.size()
     }
 
     /// The ring, for groups here and there, each of which a slice would check.

@@ -6,7 +6,8 @@
 //! as long as the differences fit, and the limit on the coordinates sees to that.
 
 use super::arithmetic::{Floats, cross, dot};
-use super::planes::{Corners, Frame, MARGIN, Planes, grow};
+use super::buffer::Buffer;
+use super::planes::{Corners, Frame, MARGIN, Planes};
 use super::tile::{Found, Sums};
 use crate::paper::refill;
 use crate::simd::{GROUP, Groups, Simd};
@@ -17,11 +18,11 @@ use crate::window::Image;
 #[derive(Debug, Default)]
 pub(crate) struct Strips<const SIMPLE: bool> {
     /// Per row, 3 planes each: sums down the columns, and along the rows.
-    columns: Vec<i32>,
-    rows: Vec<i32>,
+    columns: Buffer<i32>,
+    rows: Buffer<i32>,
     /// The row pushed last and the one before it, as integers.
-    last: Vec<i32>,
-    above: Vec<i32>,
+    last: Buffer<i32>,
+    above: Buffer<i32>,
     scale: f32,
     started: bool,
     /// By the side of a window: its places.
@@ -59,10 +60,10 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
 
     fn start(&mut self, frame: &Frame, limit: f32, side: usize, _origin: [f32; 3]) {
         for ring in [&mut self.columns, &mut self.rows] {
-            grow(ring, 3 * frame.ring * frame.stride);
+            ring.grow(3 * frame.ring * frame.stride);
         }
         for row in [&mut self.last, &mut self.above] {
-            grow(row, 3 * frame.stride);
+            row.grow(3 * frame.stride);
         }
         // 4 side limit scale < 2^31, and a power of two.
         let bits = 29.0 - (f64::from(limit) * side as f64).log2();
@@ -72,9 +73,8 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
 
     fn size(&self) -> usize {
         let Strips { columns, rows, last, above, places, .. } = self;
-        let integers =
-            [columns, rows, last, above].map(|b| b.capacity()).into_iter().sum::<usize>();
-        integers * size_of::<i32>() + places.capacity() * size_of::<Places>()
+        let integers = [columns, rows, last, above].map(Buffer::size).into_iter().sum::<usize>();
+        integers + places.capacity() * size_of::<Places>()
     }
 
     #[inline(always)]

@@ -3,8 +3,8 @@
 
 use std::ops::Range;
 
+use super::buffer::Buffer;
 use super::lanes::{LANES, LaneOrder, Lanes};
-use super::planes::grow;
 use crate::cloud::Points;
 use crate::distance::{DIAGONAL, STRAIGHT, far};
 use crate::options::Options;
@@ -22,22 +22,22 @@ pub(crate) struct WindowRows<'a> {
 #[derive(Debug, Default)]
 pub(crate) struct Sweep {
     /// A ring of two rows of depths in lane order, each with an element more for the following segments' first pixels.
-    z: Vec<Lanes>,
+    z: Buffer<Lanes>,
     /// Masks: where the pixel has a right neighbour, and where there is a depth change from the one above.
-    tested: Vec<Lanes>,
-    above: Vec<Lanes>,
-    sides: Vec<Lanes>,
+    tested: Buffer<Lanes>,
+    above: Buffer<Lanes>,
+    sides: Buffer<Lanes>,
 }
 
 impl Sweep {
     fn resize(&mut self, order: LaneOrder) {
         let length = order.segment + 1;
-        grow(&mut self.z, 2 * length);
-        grow(&mut self.above, length);
-        grow(&mut self.sides, length);
+        self.z.grow(2 * length);
+        self.above.grow(length);
+        self.sides.grow(length);
         self.above.fill(Lanes::ZERO);
-        self.tested.clear();
-        self.tested.resize(length, Lanes::ZERO);
+        self.tested.grow(length);
+        self.tested.fill(Lanes::ZERO);
         for x in 0..order.width - 1 {
             let (k, l) = order.place(x);
             self.tested[k].0[l] = f32::from_bits(!0);
@@ -66,7 +66,7 @@ impl Sweep {
     /// Bytes held.
     pub fn size(&self) -> usize {
         let Sweep { z, tested, above, sides, .. } = self;
-        [z, tested, above, sides].iter().map(|row| row.capacity() * size_of::<Lanes>()).sum()
+        [z, tested, above, sides].map(Buffer::size).into_iter().sum()
     }
 }
 

@@ -4,9 +4,9 @@ use crate::cloud::Points;
 use crate::options::{Depth, Options};
 use crate::simd::{GROUP, Groups};
 
-/// Elements of a row of depths: the width, and a group of NaN or more behind it.
+/// Elements of a row of depths: the width, and a pair of groups of NaN or more behind it.
 pub(crate) fn row_length(width: usize) -> usize {
-    width.next_multiple_of(GROUP) + GROUP
+    width.next_multiple_of(2 * GROUP) + 2 * GROUP
 }
 
 /// Fills a row of depths.

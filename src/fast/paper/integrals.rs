@@ -3,8 +3,8 @@
 use std::ops::Range;
 
 use crate::cloud::Points;
+use crate::fast::buffer::Buffer;
 use crate::fast::lanes::transpose4;
-use crate::fast::planes::grow;
 use crate::paper::{BLOCK, inverse_depth};
 use crate::simd::{GROUP, Groups};
 
@@ -21,9 +21,9 @@ pub(crate) trait Channels<const N: usize> {
 #[derive(Debug)]
 pub(crate) struct Rings<const N: usize> {
     /// Element i of a row is the sum over the columns before the i-th.
-    sums: Vec<[f64; N]>,
+    sums: Buffer<[f64; N]>,
     /// Element i + 1 of a row is the point of the i-th column; the first and those after the last are missing points.
-    points: Vec<Counted>,
+    points: Buffer<Counted>,
     columns: Range<usize>,
     /// Rows in a ring.
     pub rows: usize,
@@ -33,7 +33,13 @@ pub(crate) struct Rings<const N: usize> {
 
 impl<const N: usize> Default for Rings<N> {
     fn default() -> Self {
-        Rings { sums: Vec::new(), points: Vec::new(), columns: 0..0, rows: 0, largest: 0.0 }
+        Rings {
+            sums: Buffer::default(),
+            points: Buffer::default(),
+            columns: 0..0,
+            rows: 0,
+            largest: 0.0,
+        }
     }
 }
 
@@ -54,18 +60,16 @@ impl<const N: usize> Rings<N> {
 
     /// Bytes held.
     pub fn size(&self) -> usize {
-        self.sums.capacity() * size_of::<[f64; N]>() + self.points.capacity() * size_of::<Counted>()
+        self.sums.size() + self.points.size()
     }
 
     /// Starts over at row `top`, with rings of so many rows.
     pub fn start(&mut self, columns: Range<usize>, top: usize, rows: usize) {
         (self.columns, self.largest, self.rows) = (columns, 0.0, rows);
         let length = self.rows * self.stride();
-        grow(&mut self.points, length + BLOCK * GROUP);
+        self.points.grow(length + BLOCK * GROUP);
         self.points[..length].fill([0.0; 4]);
-        if self.sums.len() < length {
-            self.sums.resize(length, [0.0; N]);
-        }
+        self.sums.grow(length);
         let above = self.row(top + self.rows - 1);
         self.sums[above].fill([0.0; N]);
     }

@@ -20,9 +20,10 @@ use methods::{CovarianceMatrix, Gradients, MOMENTS, SmoothedDepthChanges};
 use tile::Tile;
 use windows::{Rows, Sweep, reach};
 
+use super::buffer::Buffer;
 use super::paths::{self, Task};
 use super::sink::Sink;
-use super::{Chunk, Parts, lock, read_map, reserve, share_out};
+use super::{Chunk, Parts, lock, read_map, share_out};
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
@@ -43,14 +44,14 @@ const RING_BYTES: usize = 4 << 20;
 /// Rows of the whole image: depths, and the radii of windows.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
-    depths: Vec<f32>,
-    radii: Vec<f32>,
+    depths: Buffer<f32>,
+    radii: Buffer<f32>,
 }
 
 impl Scratch {
     /// Bytes held.
     pub fn size(&self) -> usize {
-        (self.depths.capacity() + self.radii.capacity()) * size_of::<f32>()
+        self.depths.size() + self.radii.size()
     }
 }
 
@@ -227,7 +228,7 @@ impl<'a> Job<'a> {
         scratch.prepare(options.threads)?;
         let super::Scratch { workers, paper, .. } = scratch;
         let length = row_length(points.width());
-        reserve(&mut paper.depths, length * points.height(), 0.0)?;
+        paper.depths.try_grow(length * points.height())?;
         let parts = Parts(paper.depths.as_mut_ptr());
         workers.for_each(points.height(), |_, y| {
             // SAFETY: rows do not overlap.
@@ -249,7 +250,7 @@ impl<'a> Job<'a> {
         let reach = if count > 1 { reach(&options.paper) } else { height };
         share_out(height, count, reach, chunks);
         let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
-        reserve(&mut paper.radii, swept * length, 0.0)?;
+        paper.radii.try_grow(swept * length)?;
         let depths = &paper.depths[..length * height];
         let radii = &mut paper.radii[..swept * length];
         let largest = AtomicU32::new(0);
@@ -286,7 +287,7 @@ impl<'a> Job<'a> {
         let Blocks { across, down, .. } = Blocks::of(self.points.width(), self.points.height());
         let length = row_length(across);
         share_out(down, 1, down, chunks);
-        reserve(&mut paper.radii, down * length, 0.0)?;
+        paper.radii.try_grow(down * length)?;
         for (to, from) in paper.radii.chunks_mut(length).zip(given.chunks(across)) {
             for (to, from) in to.iter_mut().zip(from) {
                 *to = *from as f32;
@@ -370,7 +371,7 @@ impl Task for SweepTask<'_> {
     #[inline(always)]
     unsafe fn run<S: Groups>(mut self) -> f32 {
         // SAFETY: as the caller's.
-        unsafe { self.sweep.radii::<S>(&mut self.rows, &self.options.paper) }
+        unsafe { self.sweep.radii::<S::Pair>(&mut self.rows, &self.options.paper) }
     }
 }
 

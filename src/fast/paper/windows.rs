@@ -6,9 +6,10 @@
 //! is looked for that far, and no farther than the group of pixels needs.
 
 use super::depths::row_length;
-use crate::fast::planes::grow;
+use crate::fast::buffer::Buffer;
+use crate::fast::lanes::LANES;
 use crate::options::PaperOptions;
-use crate::simd::{GROUP, Groups};
+use crate::simd::Simd;
 
 /// More than any distance that matters; its square still fits a float exactly enough to stay the larger.
 const FAR: f32 = 1e6;
@@ -25,16 +26,16 @@ pub(crate) fn reach(options: &PaperOptions) -> usize {
 #[derive(Debug, Default)]
 pub(crate) struct Sweep {
     /// By column: the last depth, and how many rows ago it was.
-    last: Vec<f32>,
-    gap: Vec<f32>,
+    last: Buffer<f32>,
+    gap: Buffer<f32>,
     /// The row above: masks of the depth changes to the right.
-    right: Vec<f32>,
+    right: Buffer<f32>,
     /// The row below: distances along the columns.
-    below: Vec<f32>,
+    below: Buffer<f32>,
     /// Squares of them, with room before and after.
-    squares: Vec<f32>,
-    /// The square of every distance along a row, from 1 on, in a whole group.
-    along: Vec<[f32; GROUP]>,
+    squares: Buffer<f32>,
+    /// The square of every distance along a row, from 1 on, in all lanes.
+    along: Vec<[f32; LANES]>,
 }
 
 /// The rows that are swept: the depths of the whole image, and the map's rows from the first one on.
@@ -70,8 +71,8 @@ impl Sweep {
     pub fn size(&self) -> usize {
         let Sweep { last, gap, right, below, squares, along } = self;
         let rows = [last, gap, right, below, squares];
-        let rows = rows.iter().map(|row| row.capacity() * size_of::<f32>()).sum::<usize>();
-        rows + along.capacity() * size_of::<[f32; GROUP]>()
+        let rows = rows.map(Buffer::size).into_iter().sum::<usize>();
+        rows + along.capacity() * size_of::<[f32; LANES]>()
     }
 
     /// Fills the map with the windows' radii, whole numbers of pixels, 0 for none. Returns the largest.
@@ -79,15 +80,16 @@ impl Sweep {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn radii<S: Groups>(&mut self, rows: &mut Rows, options: &PaperOptions) -> f32 {
+    pub unsafe fn radii<S: Simd>(&mut self, rows: &mut Rows, options: &PaperOptions) -> f32 {
+        const { assert!(S::LANES == LANES) };
         let length = row_length(rows.width);
-        let margin = (reach(options) + AT_ONCE).next_multiple_of(GROUP);
+        let margin = (reach(options) + AT_ONCE).next_multiple_of(LANES);
         self.along.clear();
-        self.along.extend((1..=margin).map(|distance| [(distance * distance) as f32; GROUP]));
+        self.along.extend((1..=margin).map(|distance| [(distance * distance) as f32; LANES]));
         for buffer in [&mut self.last, &mut self.gap, &mut self.right, &mut self.below] {
-            grow(buffer, length);
+            buffer.grow(length);
         }
-        grow(&mut self.squares, length + 2 * margin);
+        self.squares.grow(length + 2 * margin);
         // SAFETY: as the caller's.
         unsafe {
             self.down::<S>(rows, options);
@@ -100,7 +102,7 @@ impl Sweep {
     /// # Safety
     /// As [`Sweep::radii`].
     #[inline(always)]
-    unsafe fn down<S: Groups>(&mut self, rows: &mut Rows, options: &PaperOptions) {
+    unsafe fn down<S: Simd>(&mut self, rows: &mut Rows, options: &PaperOptions) {
         let length = row_length(rows.width);
         let (first, end) = (rows.first, rows.first + rows.count);
         self.look_up(rows);
@@ -110,7 +112,7 @@ impl Sweep {
             self.below[..length].fill(FAR);
             for y in first..end {
                 let is_last = y + 1 == rows.image_rows();
-                for x in (0..length - GROUP).step_by(GROUP) {
+                for x in (0..length - LANES).step_by(LANES) {
                     let mut change = S::load(self.right.as_ptr().add(x));
                     if !is_last {
                         let last = S::load(self.last.as_ptr().add(x));
@@ -150,19 +152,19 @@ impl Sweep {
     /// # Safety
     /// As [`Sweep::radii`].
     #[inline(always)]
-    unsafe fn changes_to_right<S: Groups>(&mut self, depths: &[f32], options: &PaperOptions) {
+    unsafe fn changes_to_right<S: Simd>(&mut self, depths: &[f32], options: &PaperOptions) {
         let right = &mut self.right[..depths.len()];
         let mut before = 0;
         // SAFETY: as the caller's; a row of depths has a group behind its last one.
         unsafe {
-            for x in (0..depths.len() - GROUP).step_by(GROUP) {
+            for x in (0..depths.len() - LANES).step_by(LANES) {
                 let depth = S::load(depths.as_ptr().add(x));
                 let next = S::load(depths.as_ptr().add(x + 1));
                 let change = is_change::<S>(depth, next, S::splat(1.0), options);
                 S::store(right.as_mut_ptr().add(x), change);
                 let there = S::bits(S::eq(depth, depth));
                 let mut behind_gap = there & !(there << 1 | before);
-                before = there >> (GROUP - 1);
+                before = there >> (LANES - 1);
                 while behind_gap != 0 {
                     let at = x + behind_gap.trailing_zeros() as usize;
                     behind_gap &= behind_gap - 1;
@@ -177,14 +179,14 @@ impl Sweep {
     /// # Safety
     /// As [`Sweep::radii`].
     #[inline(always)]
-    unsafe fn up<S: Groups>(
+    unsafe fn up<S: Simd>(
         &mut self,
         rows: &mut Rows,
         options: &PaperOptions,
         margin: usize,
     ) -> f32 {
         let length = row_length(rows.width);
-        let inside = length - GROUP;
+        let inside = length - LANES;
         let (before, after) = (&mut self.below[..length], &mut self.squares[..length + 2 * margin]);
         let (below, squares) = (before, after);
         below.fill(FAR);
@@ -194,7 +196,7 @@ impl Sweep {
             let mut largest = S::splat(0.0);
             for y in (rows.first..rows.first + rows.count).rev() {
                 let map = rows.map(y).as_mut_ptr();
-                for x in (0..inside).step_by(GROUP) {
+                for x in (0..inside).step_by(LANES) {
                     let below = below.as_mut_ptr().add(x);
                     let from_below = S::add(S::load(below), S::splat(1.0));
                     let distance = S::min(S::load(map.add(x)), from_below);
@@ -205,7 +207,7 @@ impl Sweep {
                 // No depth change lies behind the row's end.
                 squares[margin + rows.width..].fill(FAR * FAR);
                 let depths = rows.depths(y).as_ptr();
-                for x in (0..inside).step_by(GROUP) {
+                for x in (0..inside).step_by(LANES) {
                     let depth = S::load(depths.add(x));
                     let squares = squares.as_ptr().add(margin + x);
                     let radius = radius::<S>(depth, squares, &self.along, options);
@@ -213,7 +215,7 @@ impl Sweep {
                     S::store(map.add(x), radius);
                 }
             }
-            let mut lanes = [0.0; GROUP];
+            let mut lanes = [0.0; LANES];
             S::store(lanes.as_mut_ptr(), largest);
             lanes.into_iter().fold(0.0, f32::max)
         }
@@ -238,7 +240,7 @@ fn mark_gap(depths: &[f32], at: usize, options: &PaperOptions, right: &mut [f32]
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn smallest_depth_change<S: Groups>(depth: S::F, options: &PaperOptions) -> S::F {
+unsafe fn smallest_depth_change<S: Simd>(depth: S::F, options: &PaperOptions) -> S::F {
     // SAFETY: as the caller's.
     unsafe { S::mul(S::mul(S::splat(options.alpha), depth), depth) }
 }
@@ -248,7 +250,7 @@ unsafe fn smallest_depth_change<S: Groups>(depth: S::F, options: &PaperOptions) 
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn is_change<S: Groups>(
+unsafe fn is_change<S: Simd>(
     depth: S::F,
     neighbour: S::F,
     gap: S::F,
@@ -262,16 +264,16 @@ unsafe fn is_change<S: Groups>(
     }
 }
 
-/// `paper::smoothing_area::smoothing_radius`, whole pixels, of eight pixels; `squares` are the squared distances to
+/// `paper::smoothing_area::smoothing_radius`, whole pixels, of sixteen pixels; `squares` are the squared distances to
 /// the changes of their own columns, as far to both sides as matters.
 ///
 /// # Safety
-/// The processor has the instruction set of `S`; `squares` is readable [`reach`] to both sides of the eight.
+/// The processor has the instruction set of `S`; `squares` is readable [`reach`] to both sides of them.
 #[inline(always)]
-unsafe fn radius<S: Groups>(
+unsafe fn radius<S: Simd>(
     depth: S::F,
     squares: *const f32,
-    along: &[[f32; GROUP]],
+    along: &[[f32; LANES]],
     options: &PaperOptions,
 ) -> S::F {
     // SAFETY: as the caller's.
