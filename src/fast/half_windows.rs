@@ -12,7 +12,8 @@ use crate::window::Image;
 #[derive(Debug, Default)]
 pub(crate) struct HalfWindows {
     integrals: Buffer<f64>,
-    last: Option<usize>,
+    /// The place of the row pushed last; before the first the one after the ring, which is zero.
+    last: usize,
     /// By the side of a window.
     places: Vec<Places>,
 }
@@ -67,8 +68,10 @@ impl Sums for HalfWindows {
     const CURVATURE: bool = false;
 
     fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, _origin: [f32; 3]) {
-        self.integrals.grow(frame.ring * frame.stride);
-        self.last = None;
+        let zero = frame.start_of(1, frame.ring)..frame.start_of(1, frame.ring + 1);
+        self.integrals.grow(zero.end);
+        self.integrals[zero].fill(0.0);
+        self.last = frame.ring;
     }
 
     fn size(&self) -> usize {
@@ -80,27 +83,22 @@ impl Sums for HalfWindows {
         let place = frame.place(y);
         let groups = frame.groups() + 1;
         assert!(MARGIN + groups * GROUP <= frame.stride);
-        assert!((place + 1) * frame.stride <= self.integrals.len());
+        assert!(frame.start_of(1, frame.ring + 1) <= self.integrals.len());
         let z = planes.row(frame, 2, y).as_ptr();
         let integrals = self.integrals.as_mut_ptr();
         // SAFETY: as the caller's; the groups lie inside the row of the ring, as was just checked.
         unsafe {
-            let row = integrals.add(place * frame.stride);
+            let above = integrals.add(frame.start_of(1, self.last));
+            let row = integrals.add(frame.start_of(1, place));
             *row.add(MARGIN - 1) = 0.0;
             let mut carry = S::splat_d(0.0);
             for group in 0..groups {
                 let at = MARGIN + group * GROUP;
                 let along = S::running_sum_d(S::widen(S::load(z.add(at))), &mut carry);
-                let sum = match self.last {
-                    Some(last) => {
-                        S::add_d(along, S::load_d(integrals.add(last * frame.stride + at)))
-                    }
-                    None => along,
-                };
-                S::store_d(row.add(at), sum);
+                S::store_d(row.add(at), S::add_d(along, S::load_d(above.add(at))));
             }
         }
-        self.last = Some(place);
+        self.last = place;
     }
 
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {

@@ -81,14 +81,6 @@ const DOUBT_SUMS: f64 = 3e4;
 /// the determinant, some 1e-16, over its square turns the normal.
 const DOUBT_PLANE: f32 = 1e-5;
 
-impl Moments {
-    /// Where the row at a place of the ring starts; its planes are a stride apart.
-    #[inline(always)]
-    fn start_of(frame: &Frame, place: usize) -> usize {
-        place * CHANNELS * frame.stride
-    }
-}
-
 impl Sums for Moments {
     type OfLanes<S: Simd> = WindowMoments<Doubles<S>>;
     type Of1 = WindowMoments<f64>;
@@ -97,7 +89,7 @@ impl Sums for Moments {
     const CURVATURE: bool = true;
 
     fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, origin: [f32; 3]) {
-        let zero = Self::start_of(frame, frame.ring)..Self::start_of(frame, frame.ring + 1);
+        let zero = frame.start_of(CHANNELS, frame.ring)..frame.start_of(CHANNELS, frame.ring + 1);
         self.integrals.grow(zero.end);
         self.integrals[zero].fill(0.0);
         self.centered.grow(3 * frame.stride);
@@ -117,11 +109,11 @@ impl Sums for Moments {
         let groups = frame.groups() + 1;
         let (stride, plane) = (frame.stride, 3 * frame.stride);
         assert!(MARGIN + groups * GROUP <= stride && plane <= self.centered.len());
-        assert!(Self::start_of(frame, frame.ring + 1) <= self.integrals.len());
+        assert!(frame.start_of(CHANNELS, frame.ring + 1) <= self.integrals.len());
         let from = planes.rows(frame, y);
         let centered = self.centered.as_mut_ptr();
-        let above = self.integrals.as_ptr().wrapping_add(Self::start_of(frame, self.last));
-        let row = self.integrals.as_mut_ptr().wrapping_add(Self::start_of(frame, place));
+        let above = self.integrals.as_ptr().wrapping_add(frame.start_of(CHANNELS, self.last));
+        let row = self.integrals.as_mut_ptr().wrapping_add(frame.start_of(CHANNELS, place));
         // SAFETY: as the caller's; the groups lie inside the planes and rows, whose lengths were just checked.
         unsafe {
             for c in 0..3 {
@@ -142,7 +134,7 @@ impl Sums for Moments {
             }
         }
         self.last = place;
-        let end = Self::start_of(frame, place) + MARGIN + groups * GROUP - 1;
+        let end = frame.start_of(CHANNELS, place) + MARGIN + groups * GROUP - 1;
         let square = |c: usize| self.integrals[end + c * stride];
         self.error = ROUNDING * (square(3) + square(6) + square(8));
     }

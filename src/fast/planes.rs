@@ -46,7 +46,13 @@ impl Frame {
     /// Where row `y` starts in a ring of so many planes, which are a stride apart.
     #[inline(always)]
     pub fn start(&self, planes: usize, y: usize) -> usize {
-        self.place(y) * planes * self.stride
+        self.start_of(planes, self.place(y))
+    }
+
+    /// Where the row at a place of the ring starts. The one after the ring's last is for what is above the first row.
+    #[inline(always)]
+    pub fn start_of(&self, planes: usize, place: usize) -> usize {
+        place * planes * self.stride
     }
 
     /// The corners of what lies between two rows, counted from row `y`, and two columns, counted from a pixel's, in a

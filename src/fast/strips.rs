@@ -24,7 +24,8 @@ pub(crate) struct Strips<const SIMPLE: bool> {
     last: Buffer<i32>,
     above: Buffer<i32>,
     scale: f32,
-    started: bool,
+    /// The place of the row pushed last; before the first the one after the ring, which is zero.
+    pushed: usize,
     /// By the side of a window: its places.
     places: Vec<Places>,
 }
@@ -59,16 +60,18 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     const CURVATURE: bool = false;
 
     fn start(&mut self, frame: &Frame, limit: f32, side: usize, _origin: [f32; 3]) {
-        for ring in [&mut self.columns, &mut self.rows] {
-            ring.grow(3 * frame.ring * frame.stride);
-        }
+        let zero = frame.start_of(3, frame.ring)..frame.start_of(3, frame.ring + 1);
+        self.rows.grow(zero.start);
+        self.columns.grow(zero.end);
+        self.columns[zero].fill(0);
         for row in [&mut self.last, &mut self.above] {
             row.grow(3 * frame.stride);
+            row.fill(0);
         }
         // 4 side limit scale < 2^31, and a power of two.
         let bits = 29.0 - (f64::from(limit) * side as f64).log2();
         self.scale = bits.floor().clamp(-120.0, 120.0).exp2() as f32;
-        self.started = false;
+        self.pushed = frame.ring;
     }
 
     fn size(&self) -> usize {
@@ -84,13 +87,14 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
         for c in 0..3 {
             let start = c * frame.stride;
             let own = frame.start(3, y) + start;
-            let above = if self.started { frame.start(3, y - 1) + start } else { own };
+            let above = frame.start_of(3, self.pushed) + start;
             let from = planes.row(frame, c, y).as_ptr();
             let last = &mut self.last[start..start + frame.stride];
             let pair = &self.above[start..start + frame.stride];
             let rows = &mut self.rows[own..own + frame.stride];
             assert!(
-                MARGIN + groups * GROUP <= frame.stride && own + frame.stride <= self.columns.len()
+                MARGIN + groups * GROUP <= frame.stride
+                    && own.max(above) + frame.stride <= self.columns.len()
             );
             // SAFETY: as the caller's; the groups lie inside the rows, whose lengths were just checked.
             unsafe {
@@ -100,7 +104,7 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
                     let at = MARGIN + group * GROUP;
                     let point = S::round_i(S::mul(S::load(from.add(at)), scale));
                     S::store_i(last.as_mut_ptr().add(at), point);
-                    let strip = if SIMPLE || !self.started {
+                    let strip = if SIMPLE {
                         point
                     } else {
                         S::add_i(point, S::load_i(pair.as_ptr().add(at)))
@@ -115,14 +119,12 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
                     if !SIMPLE {
                         strip = S::add_i(strip, S::load_i(last.as_ptr().add(at - 1)));
                     }
-                    if self.started {
-                        strip = S::add_i(strip, S::load_i(columns.add(above + at)));
-                    }
+                    strip = S::add_i(strip, S::load_i(columns.add(above + at)));
                     S::store_i(columns.add(own + at), strip);
                 }
             }
         }
-        self.started = true;
+        self.pushed = frame.place(y);
     }
 
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
