@@ -553,8 +553,8 @@ impl Normals<'_> {
         &self,
         x: usize,
         y: usize,
-        normal: &[[f32; 8]; 3],
-        curvature: &[f32; 8],
+        normal: [&[f32; GROUP]; 3],
+        curvature: &[f32; GROUP],
     ) {
         let (first, step) = (self.grid.offset(x, y), self.grid.point_stride);
         let [nx, ny, nz] = self.normal.map(|field| field.wrapping_byte_add(first));
@@ -593,7 +593,7 @@ impl Normals<'_> {
     /// # Safety
     /// As [`Normals::write_group`].
     #[inline(always)]
-    unsafe fn write_group_curvature(&self, x: usize, y: usize, curvature: &[f32; 8]) {
+    unsafe fn write_group_curvature(&self, x: usize, y: usize, curvature: &[f32; GROUP]) {
         if let Some((field, grid)) = self.curvature {
             let field = field.wrapping_byte_add(grid.offset(x, y));
             for (lane, value) in curvature.iter().enumerate() {

@@ -1,6 +1,6 @@
 //! Where a tile's normals go: to every pixel, or to the places of the pixels that indices list.
 
-use super::tile::Octet;
+use super::tile::Estimates;
 use crate::Error;
 use crate::cloud::Normals;
 use crate::simd::GROUP;
@@ -48,33 +48,41 @@ impl<'a> Sink<'a> {
         }
     }
 
-    /// Writes the first `count` of eight normals, for the pixels from `(x, y)` on. Without `curvature` all of them are
+    /// Writes the first `count` of some estimates, for the pixels from `(x, y)` on. Without `curvature` all of those are
     /// known to be NaN.
     ///
     /// # Safety
     /// The pixels are inside the image, and no other thread writes them.
     #[inline(always)]
-    pub unsafe fn write(&self, x: usize, y: usize, count: usize, octet: &Octet, curvature: bool) {
-        let normal = |lane: usize| octet.normal.map(|c| c[lane]);
+    pub unsafe fn write<'r, const N: usize>(
+        &self,
+        x: usize,
+        y: usize,
+        count: usize,
+        estimates: &'r Estimates<N>,
+        curvature: bool,
+    ) {
+        let Estimates { normal: [nx, ny, nz], curvature: curvatures } = estimates;
+        let normal = |lane: usize| [nx[lane], ny[lane], nz[lane]];
         match self {
             // SAFETY: as the caller's.
             Sink::All(normals) => unsafe {
-                if count == GROUP {
-                    let curvature = if curvature { &octet.curvature } else { &[f32::NAN; GROUP] };
-                    normals.write_group(x, y, &octet.normal, curvature);
-                } else {
-                    for lane in 0..count {
-                        normals.write(x + lane, y, normal(lane), octet.curvature[lane]);
-                    }
+                let groups = count / GROUP * GROUP;
+                for at in (0..groups).step_by(GROUP) {
+                    let group =
+                        |from: &'r [f32; N]| from[at..].first_chunk().expect("a whole group");
+                    let curvature = if curvature { group(curvatures) } else { &[f32::NAN; GROUP] };
+                    normals.write_group(x + at, y, [group(nx), group(ny), group(nz)], curvature);
+                }
+                for lane in groups..count {
+                    normals.write(x + lane, y, normal(lane), curvatures[lane]);
                 }
             },
             Sink::Listed { normals, width, .. } => {
                 for (pixel, element) in self.listed(x, y, count) {
                     let lane = *pixel as usize - (y * width + x);
                     // SAFETY: as the caller's; every listed element is one of the normals.
-                    unsafe {
-                        normals.write(*element as usize, 0, normal(lane), octet.curvature[lane])
-                    };
+                    unsafe { normals.write(*element as usize, 0, normal(lane), curvatures[lane]) };
                 }
             }
         }
@@ -86,24 +94,7 @@ impl<'a> Sink<'a> {
     /// As [`Sink::write`].
     #[inline(always)]
     pub unsafe fn write_none(&self, x: usize, y: usize, count: usize) {
-        let none = [f32::NAN; 3];
-        match self {
-            // SAFETY: as the caller's.
-            Sink::All(normals) => unsafe {
-                if count == GROUP {
-                    normals.write_group(x, y, &[[f32::NAN; GROUP]; 3], &[f32::NAN; GROUP]);
-                } else {
-                    for lane in 0..count {
-                        normals.write(x + lane, y, none, f32::NAN);
-                    }
-                }
-            },
-            Sink::Listed { normals, .. } => {
-                for (_, element) in self.listed(x, y, count) {
-                    // SAFETY: as the caller's; every listed element is one of the normals.
-                    unsafe { normals.write(*element as usize, 0, none, f32::NAN) };
-                }
-            }
-        }
+        // SAFETY: as the caller's.
+        unsafe { self.write(x, y, count, &Estimates::<{ 2 * GROUP }>::NONE, false) };
     }
 }

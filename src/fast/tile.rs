@@ -256,60 +256,49 @@ impl Tile<'_> {
     ) {
         let row = sides(y);
         let planes_row = planes.rows(frame, y);
-        let viewpoint = self.options.viewpoint;
-        let mut x = self.columns.start;
-        while x < self.columns.end {
+        for x in self.columns.clone().step_by(2 * GROUP) {
             // SAFETY: as the caller's; a row of sides is readable up to a whole pair of groups.
             unsafe {
+                let count = (self.columns.end - x).min(2 * GROUP);
                 let pair = [
                     Group::<S>::new(self, row, x, y, inner),
                     Group::new(self, row, x + GROUP, y, inner),
                 ];
-                x += 2 * GROUP;
                 let windows = pair[0].windows | pair[1].windows << GROUP;
-                if windows == 0 || hidden {
-                    for group in &pair {
-                        self.without_sums(sink, group);
-                    }
+                if windows == 0 {
+                    sink.write_none(x, y, count);
                     continue;
                 }
-                let (mut of16, left) = self.pair::<S, M>(frame, planes, sums, sides, &pair);
-                let group_sides = S::pair(pair[0].sides, pair[1].sides);
-                let (mut fresh, lanes) = (0, windows & !left);
-                let found = loop {
-                    let found = sums.estimate::<S::Pair>(frame, &of16, group_sides, lanes, fresh);
-                    let again = found.doubtful & lanes & !fresh;
-                    let tried = self.afresh::<S, M>(&mut of16, row, pair[0].x, y, again);
-                    if tried == 0 {
-                        break found;
-                    }
-                    fresh |= tried;
-                };
-                let plain = left | found.doubtful & windows;
-                let normals = found.normal.map(|c| S::groups(c.0));
-                let curvatures = S::groups(found.curvature.0);
-                for g in 0..2 {
-                    let group = &pair[g];
-                    let plain = plain >> (g * GROUP) & 0xff;
-                    if group.windows == 0 {
-                        sink.write_none(group.x, y, group.count);
-                        continue;
-                    }
-                    let column = frame.column(group.x);
+                let mut estimates = Estimates::NONE;
+                let mut plain = windows;
+                if !hidden {
+                    let (mut of16, left) = self.pair::<S, M>(frame, planes, sums, sides, &pair);
+                    let group_sides = S::pair(pair[0].sides, pair[1].sides);
+                    let (mut fresh, lanes) = (0, windows & !left);
+                    let found = loop {
+                        let found =
+                            sums.estimate::<S::Pair>(frame, &of16, group_sides, lanes, fresh);
+                        let again = found.doubtful & lanes & !fresh;
+                        let tried = self.afresh::<S, M>(&mut of16, row, x, y, again);
+                        if tried == 0 {
+                            break found;
+                        }
+                        fresh |= tried;
+                    };
+                    plain = left | found.doubtful & windows;
+                    let column = frame.column(x);
                     let point = [
                         Floats::load(planes_row[0].as_ptr().add(column)),
                         Floats::load(planes_row[1].as_ptr().add(column)),
                         Floats::load(planes_row[2].as_ptr().add(column)),
                     ];
-                    let normal = normals.map(|c| Floats(c[g]));
-                    let curvature = Floats(curvatures[g]);
-                    let sure = group.windows & !plain;
-                    let mut normals = Octet::of::<S>(normal, curvature, point, viewpoint, sure);
-                    if plain != 0 {
-                        self.plain_lanes(&mut normals, group, plain);
-                    }
-                    sink.write(group.x, y, group.count, &normals, M::CURVATURE);
+                    let viewpoint = self.options.viewpoint;
+                    estimates = Estimates::of(found, point, viewpoint, windows & !plain);
                 }
+                if plain != 0 {
+                    self.plain_lanes(&mut estimates, row, (x, y), plain);
+                }
+                sink.write(x, y, count, &estimates, M::CURVATURE);
             }
         }
     }
@@ -339,34 +328,22 @@ impl Tile<'_> {
         tried
     }
 
-    /// A group that needs no sums: without windows, or whose windows are all left to the plain form.
-    ///
-    /// # Safety
-    /// As [`Tile::compute`].
-    #[inline(always)]
-    unsafe fn without_sums<S: Groups>(&self, sink: &Sink, group: &Group<S>) {
-        // SAFETY: as the caller's.
-        unsafe {
-            if group.windows == 0 {
-                sink.write_none(group.x, group.y, group.count);
-                return;
-            }
-            let mut normals = Octet::none();
-            self.plain_lanes(&mut normals, group, group.windows);
-            sink.write(group.x, group.y, group.count, &normals, true);
-        }
-    }
-
-    /// The normals of some of a group's lanes by the plain form.
+    /// The normals of some lanes of those that begin with pixel `(x, y)`, by the plain form.
     #[cold]
-    fn plain_lanes<S: Groups>(&self, normals: &mut Octet, group: &Group<S>, lanes: u32) {
+    fn plain_lanes(
+        &self,
+        estimates: &mut Estimates<{ 2 * GROUP }>,
+        row: &[f32],
+        (x, y): (usize, usize),
+        lanes: u32,
+    ) {
         for lane in Bits(lanes) {
-            let pixel = (group.x + lane, group.y);
-            let side = group.row[pixel.0] as usize;
+            let pixel = (x + lane, y);
+            let side = row[pixel.0] as usize;
             let found = estimate(self.options.method, self.points, self.image, pixel, side);
             let point = self.points.at(pixel.0, pixel.1);
             let normal = turn_to_viewpoint(found.normal, point, self.options.viewpoint);
-            normals.put(lane, Estimate { normal, ..found });
+            estimates.put(lane, Estimate { normal, ..found });
         }
     }
 
@@ -556,8 +533,6 @@ struct Group<'a, S: Groups> {
     /// The row's sides of windows, and the eight pixels'.
     row: &'a [f32],
     sides: S::F,
-    /// Its pixels in the tile; none for the half of a pair that lies behind the tile.
-    count: usize,
     /// The lanes that have a window.
     windows: u32,
     /// Whether windows of any of the tile's sides are inside the image here.
@@ -575,7 +550,7 @@ impl<'a, S: Groups> Group<'a, S> {
             let sides = S::load(row.as_ptr().add(x));
             let windows = S::bits(S::lt(S::splat(0.0), sides)) & ((1 << count) - 1);
             let inner = contains(inner, x..=x + GROUP - 1);
-            Group { x, y, row, sides, count, windows, inner }
+            Group { x, y, row, sides, windows, inner }
         }
     }
 
@@ -622,18 +597,15 @@ impl Iterator for Bits {
     }
 }
 
-/// Eight normals and curvatures.
-#[repr(C, align(32))]
-pub(crate) struct Octet {
-    pub normal: [[f32; GROUP]; 3],
-    pub curvature: [f32; GROUP],
+/// Normals and curvatures of pixels side by side.
+#[repr(C, align(64))]
+pub(crate) struct Estimates<const N: usize> {
+    pub normal: [[f32; N]; 3],
+    pub curvature: [f32; N],
 }
 
-impl Octet {
-    #[inline(always)]
-    fn none() -> Self {
-        Octet { normal: [[f32::NAN; GROUP]; 3], curvature: [f32::NAN; GROUP] }
-    }
+impl<const N: usize> Estimates<N> {
+    pub const NONE: Self = Estimates { normal: [[f32::NAN; N]; 3], curvature: [f32::NAN; N] };
 
     #[inline(always)]
     pub fn put(&mut self, lane: usize, estimate: Estimate) {
@@ -648,14 +620,14 @@ impl Octet {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn of<S: Groups>(
-        normal: [Floats<S>; 3],
-        curvature: Floats<S>,
+    pub unsafe fn of<S: Simd>(
+        Found { normal, curvature, .. }: Found<S>,
         point: [Floats<S>; 3],
         viewpoint: [f32; 3],
         lanes: u32,
     ) -> Self {
-        // SAFETY: as the caller's; the arrays hold a group each.
+        const { assert!(S::LANES == N) };
+        // SAFETY: as the caller's; the arrays hold so many lanes each.
         unsafe {
             let [x, y, z] = viewpoint;
             let viewpoint = [Floats::<S>::splat(x), Floats::splat(y), Floats::splat(z)];
@@ -665,14 +637,14 @@ impl Octet {
             let flip = S::and(S::lt(cosine.0, S::splat(0.0)), S::splat(-0.0));
             let mask = S::mask(lanes);
             let none = S::splat(f32::NAN);
-            let mut octet = std::mem::MaybeUninit::<Octet>::uninit();
-            let to = octet.as_mut_ptr().cast::<f32>();
+            let mut estimates = std::mem::MaybeUninit::<Self>::uninit();
+            let to = estimates.as_mut_ptr().cast::<f32>();
             for c in 0..3 {
                 let normal = S::select(mask, S::xor(normal[c].0, flip), none);
-                S::store(to.add(c * GROUP), normal);
+                S::store(to.add(c * N), normal);
             }
-            S::store(to.add(3 * GROUP), S::select(mask, curvature.0, none));
-            octet.assume_init()
+            S::store(to.add(3 * N), S::select(mask, curvature.0, none));
+            estimates.assume_init()
         }
     }
 }

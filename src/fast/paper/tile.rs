@@ -8,7 +8,7 @@ use super::methods::{Sums, gather};
 use super::rects::{Place, Rects};
 use crate::cloud::Points;
 use crate::fast::sink::Sink;
-use crate::fast::tile::{Bits, Octet};
+use crate::fast::tile::{Bits, Estimates};
 use crate::methods::Estimate;
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
@@ -140,8 +140,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 let [px, py, pz, _] = gather::<S>(rings.points_from(x, y), &steps);
                 let viewpoint = self.options.viewpoint;
                 let (sure, here) = (windows & !plain, [px, py, pz]);
-                let mut normals =
-                    Octet::of::<S>(found.normal, found.curvature, here, viewpoint, sure);
+                let mut normals = Estimates::<GROUP>::of(found, here, viewpoint, sure);
                 for lane in Bits(plain) {
                     normals.put(lane, self.plain(&cleaned, pixel(lane), &rect(lane)));
                 }
