@@ -313,9 +313,9 @@ pub(crate) unsafe fn plane<S: Simd>(
         for _ in 0..STEPS {
             slope = ((three * value - twice) * value + c1).narrow();
             // The steps grow small: floats tell how far they go.
-            let step = (((value - c2) * value + c1) * value - c0).narrow() / slope;
-            value = value - step.widen();
-            unsettled = !step.abs().lt(converged * slope) & lanes;
+            let off = (((value - c2) * value + c1) * value - c0).narrow();
+            value = value - (off / slope).widen();
+            unsettled = !off.abs().lt(converged * slope * slope.abs()) & lanes;
             if unsettled == 0 {
                 break;
             }
