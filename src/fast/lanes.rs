@@ -10,7 +10,7 @@ use crate::simd::{GROUP, Simd};
 pub(crate) const LANES: usize = 2 * GROUP;
 
 /// One float of each of sixteen pixels.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Lanes(pub [f32; LANES]);
 

@@ -155,7 +155,7 @@ impl Sweep {
     unsafe fn changes_to_right<S: Simd>(&mut self, depths: &[f32], options: &PaperOptions) {
         let right = &mut self.right[..depths.len()];
         let mut before = 0;
-        // SAFETY: as the caller's; a row of depths has a group behind its last one.
+        // SAFETY: as the caller's; a row of depths has a pair of groups behind its last ones.
         unsafe {
             for x in (0..depths.len() - LANES).step_by(LANES) {
                 let depth = S::load(depths.as_ptr().add(x));
