@@ -117,10 +117,6 @@ impl Groups for Avx512 {
     unsafe fn pair_d(first: Self::D, second: Self::D) -> [__m512d; 2] {
         [first, second]
     }
-    #[inline(always)]
-    unsafe fn groups(pair: __m512) -> [Self::F; 2] {
-        unsafe { [_mm512_castps512_ps256(pair), _mm512_extractf32x8_ps::<1>(pair)] }
-    }
 
     #[inline(always)]
     unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
@@ -238,7 +234,10 @@ impl Simd for Avx512Pair {
 
     #[inline(always)]
     unsafe fn widen(a: Self::F) -> Self::D {
-        unsafe { Avx512::groups(a).map(|group| Avx512::widen(group)) }
+        unsafe {
+            let (low, high) = (_mm512_castps512_ps256(a), _mm512_extractf32x8_ps::<1>(a));
+            [_mm512_cvtps_pd(low), _mm512_cvtps_pd(high)]
+        }
     }
     #[inline(always)]
     unsafe fn narrow(a: Self::D) -> Self::F {

@@ -137,8 +137,6 @@ pub(crate) trait Groups: Simd {
     unsafe fn pair(first: Self::F, second: Self::F) -> <Self::Pair as Simd>::F;
     unsafe fn pair_i(first: Self::I, second: Self::I) -> <Self::Pair as Simd>::I;
     unsafe fn pair_d(first: Self::D, second: Self::D) -> <Self::Pair as Simd>::D;
-    /// Both groups.
-    unsafe fn groups(pair: <Self::Pair as Simd>::F) -> [Self::F; 2];
 
     /// Lanes 0 to 3 from one place, 4 to 7 from another.
     unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F;

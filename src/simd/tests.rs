@@ -147,7 +147,6 @@ unsafe fn of_groups<S: Groups>(a: &[f32; 16], b: &[f32; 16]) -> Results {
         let pair = S::pair(x, y);
         results.floats::<S>([S::load_halves(b.as_ptr().add(3), a.as_ptr().add(1))]);
         results.floats::<S>(S::transpose_halves([x, y, S::add(x, x), S::add(y, y)]));
-        results.floats::<S>(S::groups(pair));
         results.integers::<S>([S::prefix_sum_i(i), S::last_i(i)]);
         let doubles: [f64; 16] = std::array::from_fn(|l| f64::from(a[l]));
         results.doubles::<S>([

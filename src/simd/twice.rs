@@ -23,10 +23,6 @@ macro_rules! twice {
         unsafe fn pair_d(first: Self::D, second: Self::D) -> [Self::D; 2] {
             [first, second]
         }
-        #[inline(always)]
-        unsafe fn groups(pair: [Self::F; 2]) -> [Self::F; 2] {
-            pair
-        }
     };
 }
 pub(crate) use twice;
