@@ -363,8 +363,7 @@ impl PointRow<'_> {
 }
 
 /// Bytes of a cache line.
-#[cfg(target_arch = "x86_64")]
-const LINE: usize = 64;
+pub(crate) const LINE: usize = 64;
 
 /// Where normals go: nx, ny, nz and, if wanted, the curvature of every pixel. Other bytes stay untouched.
 #[derive(Debug)]

@@ -4,8 +4,8 @@
 use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut};
 
-/// Bytes of a cache line.
-const LINE: usize = 64;
+use crate::Error;
+use crate::cloud::LINE;
 
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
@@ -49,9 +49,9 @@ impl<T: Number> Buffer<T> {
     }
 
     /// As [`Buffer::grow`], if there is memory.
-    pub fn try_grow(&mut self, length: usize) -> Result<(), crate::Error> {
+    pub fn try_grow(&mut self, length: usize) -> Result<(), Error> {
         let lines = (length * size_of::<T>()).div_ceil(LINE).saturating_sub(self.lines.len());
-        self.lines.try_reserve(lines).map_err(|_| crate::Error::OutOfMemory)?;
+        self.lines.try_reserve(lines).map_err(|_| Error::OutOfMemory)?;
         self.grow(length);
         Ok(())
     }

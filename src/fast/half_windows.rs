@@ -13,7 +13,7 @@ use crate::window::Image;
 pub(crate) struct HalfWindows {
     integrals: Buffer<f64>,
     /// The place of the row pushed last; before the first the one after the ring, which is zero.
-    last: usize,
+    pushed: usize,
     /// By the side of a window.
     places: Vec<Places>,
 }
@@ -68,10 +68,7 @@ impl Sums for HalfWindows {
     const CURVATURE: bool = false;
 
     fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, _origin: [f32; 3]) {
-        let zero = frame.start_of(1, frame.ring)..frame.start_of(1, frame.ring + 1);
-        self.integrals.grow(zero.end);
-        self.integrals[zero].fill(0.0);
-        self.last = frame.ring;
+        self.pushed = frame.start_ring(1, &mut self.integrals);
     }
 
     fn size(&self) -> usize {
@@ -88,7 +85,7 @@ impl Sums for HalfWindows {
         let integrals = self.integrals.as_mut_ptr();
         // SAFETY: as the caller's; the groups lie inside the row of the ring, as was just checked.
         unsafe {
-            let above = integrals.add(frame.start_of(1, self.last));
+            let above = integrals.add(frame.start_of(1, self.pushed));
             let row = integrals.add(frame.start_of(1, place));
             *row.add(MARGIN - 1) = 0.0;
             let mut carry = S::splat_d(0.0);
@@ -98,7 +95,7 @@ impl Sums for HalfWindows {
                 S::store_d(row.add(at), S::add_d(along, S::load_d(above.add(at))));
             }
         }
-        self.last = place;
+        self.pushed = place;
     }
 
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {

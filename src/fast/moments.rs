@@ -21,7 +21,7 @@ pub(crate) struct Moments {
     centered: Buffer<f64>,
     origin: [f32; 3],
     /// The place of the row pushed last; before the first the one after the ring, which is zero.
-    last: usize,
+    pushed: usize,
     /// What the sums' rounding errors stay below.
     error: f64,
     /// By the side of a window: its corners and its share.
@@ -89,12 +89,9 @@ impl Sums for Moments {
     const CURVATURE: bool = true;
 
     fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, origin: [f32; 3]) {
-        let zero = frame.start_of(CHANNELS, frame.ring)..frame.start_of(CHANNELS, frame.ring + 1);
-        self.integrals.grow(zero.end);
-        self.integrals[zero].fill(0.0);
+        self.pushed = frame.start_ring(CHANNELS, &mut self.integrals);
         self.centered.grow(3 * frame.stride);
         self.origin = origin;
-        self.last = frame.ring;
     }
 
     fn size(&self) -> usize {
@@ -112,7 +109,7 @@ impl Sums for Moments {
         assert!(frame.start_of(CHANNELS, frame.ring + 1) <= self.integrals.len());
         let from = planes.rows(frame, y);
         let centered = self.centered.as_mut_ptr();
-        let above = self.integrals.as_ptr().wrapping_add(frame.start_of(CHANNELS, self.last));
+        let above = self.integrals.as_ptr().wrapping_add(frame.start_of(CHANNELS, self.pushed));
         let row = self.integrals.as_mut_ptr().wrapping_add(frame.start_of(CHANNELS, place));
         // SAFETY: as the caller's; the groups lie inside the planes and rows, whose lengths were just checked.
         unsafe {
@@ -133,7 +130,7 @@ impl Sums for Moments {
                 integrate::<S, 2>([coordinate(a), coordinate(b)], above, row, c * stride, groups);
             }
         }
-        self.last = place;
+        self.pushed = place;
         let end = frame.start_of(CHANNELS, place) + MARGIN + groups * GROUP - 1;
         let square = |c: usize| self.integrals[end + c * stride];
         self.error = ROUNDING * (square(3) + square(6) + square(8));

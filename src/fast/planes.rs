@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::arithmetic::Doubles;
-use super::buffer::Buffer;
+use super::buffer::{Buffer, Number};
 use crate::cloud::Points;
 use crate::simd::{GROUP, Groups, Simd};
 
@@ -49,10 +49,19 @@ impl Frame {
         self.start_of(planes, self.place(y))
     }
 
-    /// Where the row at a place of the ring starts. The one after the ring's last is for what is above the first row.
+    /// Where the row at a place of the ring starts.
     #[inline(always)]
     pub fn start_of(&self, planes: usize, place: usize) -> usize {
         place * planes * self.stride
+    }
+
+    /// Makes room for a ring of so many planes, and after it for a row of zeros, whose place it returns: what is above
+    /// the first row that will be pushed.
+    pub fn start_ring<T: Number + Default>(&self, planes: usize, ring: &mut Buffer<T>) -> usize {
+        let zeros = self.start_of(planes, self.ring)..self.start_of(planes, self.ring + 1);
+        ring.grow(zeros.end);
+        ring[zeros].fill(T::default());
+        self.ring
     }
 
     /// The corners of what lies between two rows, counted from row `y`, and two columns, counted from a pixel's, in a

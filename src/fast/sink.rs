@@ -54,12 +54,12 @@ impl<'a> Sink<'a> {
     /// # Safety
     /// The pixels are inside the image, and no other thread writes them.
     #[inline(always)]
-    pub unsafe fn write<'r, const N: usize>(
+    pub unsafe fn write<const N: usize>(
         &self,
         x: usize,
         y: usize,
         count: usize,
-        estimates: &'r Estimates<N>,
+        estimates: &Estimates<N>,
         curvature: bool,
     ) {
         let Estimates { normal: [nx, ny, nz], curvature: curvatures } = estimates;
@@ -69,10 +69,10 @@ impl<'a> Sink<'a> {
             Sink::All(normals) => unsafe {
                 let groups = count / GROUP * GROUP;
                 for at in (0..groups).step_by(GROUP) {
-                    let group =
-                        |from: &'r [f32; N]| from[at..].first_chunk().expect("a whole group");
-                    let curvature = if curvature { group(curvatures) } else { &[f32::NAN; GROUP] };
-                    normals.write_group(x + at, y, [group(nx), group(ny), group(nz)], curvature);
+                    let [nx, ny, nz, found] = [nx, ny, nz, curvatures]
+                        .map(|from| from[at..].first_chunk().expect("a whole group"));
+                    let curvature = if curvature { found } else { &[f32::NAN; GROUP] };
+                    normals.write_group(x + at, y, [nx, ny, nz], curvature);
                 }
                 for lane in groups..count {
                     normals.write(x + lane, y, normal(lane), curvatures[lane]);

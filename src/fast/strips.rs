@@ -60,18 +60,15 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     const CURVATURE: bool = false;
 
     fn start(&mut self, frame: &Frame, limit: f32, side: usize, _origin: [f32; 3]) {
-        let zero = frame.start_of(3, frame.ring)..frame.start_of(3, frame.ring + 1);
-        self.rows.grow(zero.start);
-        self.columns.grow(zero.end);
-        self.columns[zero].fill(0);
+        self.pushed = frame.start_ring(3, &mut self.columns);
+        self.rows.grow(frame.start_of(3, frame.ring));
         for row in [&mut self.last, &mut self.above] {
             row.grow(3 * frame.stride);
-            row.fill(0);
         }
+        self.last.fill(0); // it is what is above the first row
         // 4 side limit scale < 2^31, and a power of two.
         let bits = 29.0 - (f64::from(limit) * side as f64).log2();
         self.scale = bits.floor().clamp(-120.0, 120.0).exp2() as f32;
-        self.pushed = frame.ring;
     }
 
     fn size(&self) -> usize {

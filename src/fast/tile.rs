@@ -269,9 +269,9 @@ impl Tile<'_> {
                     sink.write_none(x, y, count);
                     continue;
                 }
-                let mut estimates = Estimates::NONE;
-                let mut plain = windows;
-                if !hidden {
+                let (mut estimates, plain) = if hidden {
+                    (Estimates::NONE, windows)
+                } else {
                     let (mut of16, left) = self.pair::<S, M>(frame, planes, sums, sides, &pair);
                     let group_sides = S::pair(pair[0].sides, pair[1].sides);
                     let (mut fresh, lanes) = (0, windows & !left);
@@ -285,7 +285,7 @@ impl Tile<'_> {
                         }
                         fresh |= tried;
                     };
-                    plain = left | found.doubtful & windows;
+                    let plain = left | found.doubtful & windows;
                     let column = frame.column(x);
                     let point = [
                         Floats::load(planes_row[0].as_ptr().add(column)),
@@ -293,8 +293,8 @@ impl Tile<'_> {
                         Floats::load(planes_row[2].as_ptr().add(column)),
                     ];
                     let viewpoint = self.options.viewpoint;
-                    estimates = Estimates::of(found, point, viewpoint, windows & !plain);
-                }
+                    (Estimates::of(found, point, viewpoint, windows & !plain), plain)
+                };
                 if plain != 0 {
                     self.plain_lanes(&mut estimates, row, (x, y), plain);
                 }

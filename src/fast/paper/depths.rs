@@ -1,12 +1,13 @@
 //! The depths of a row of points, missing ones NaN.
 
 use crate::cloud::Points;
+use crate::fast::lanes::LANES;
 use crate::options::{Depth, Options};
 use crate::simd::{GROUP, Groups};
 
 /// Elements of a row of depths: the width, and a pair of groups of NaN or more behind it.
 pub(crate) fn row_length(width: usize) -> usize {
-    width.next_multiple_of(2 * GROUP) + 2 * GROUP
+    width.next_multiple_of(LANES) + LANES
 }
 
 /// Fills a row of depths.

@@ -18,7 +18,7 @@ pub(crate) trait Channels<const N: usize> {
 }
 
 /// Both rings, over a tile's columns.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Rings<const N: usize> {
     /// Element i of a row is the sum over the columns before the i-th.
     sums: Buffer<[f64; N]>,
@@ -29,18 +29,6 @@ pub(crate) struct Rings<const N: usize> {
     pub rows: usize,
     /// The largest magnitude of a coordinate read so far.
     pub largest: f32,
-}
-
-impl<const N: usize> Default for Rings<N> {
-    fn default() -> Self {
-        Rings {
-            sums: Buffer::default(),
-            points: Buffer::default(),
-            columns: 0..0,
-            rows: 0,
-            largest: 0.0,
-        }
-    }
 }
 
 /// The columns or rows, of so many, that windows of those in `range` reach at a distance from their pixels at most.
