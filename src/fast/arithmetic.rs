@@ -5,7 +5,7 @@
 
 use std::ops::{Add, Div, Mul, Sub};
 
-use crate::simd::{Groups, Simd};
+use crate::simd::Simd;
 
 /// As many f32 as there are lanes.
 pub(crate) struct Floats<S: Simd>(pub S::F);
@@ -113,24 +113,6 @@ impl<S: Simd> Floats<S> {
     pub fn widen(self) -> Doubles<S> {
         // SAFETY: there is a group, so there is the instruction set.
         Doubles(unsafe { S::widen(self.0) })
-    }
-}
-
-impl<S: Groups> Floats<S> {
-    /// Two groups side by side.
-    #[inline(always)]
-    pub fn pair(self, second: Self) -> Floats<S::Pair> {
-        // SAFETY: there is a group, so there is the instruction set.
-        Floats(unsafe { S::pair(self.0, second.0) })
-    }
-}
-
-impl<S: Groups> Doubles<S> {
-    /// Two groups side by side.
-    #[inline(always)]
-    pub fn pair(self, second: Self) -> Doubles<S::Pair> {
-        // SAFETY: there is a group, so there is the instruction set.
-        Doubles(unsafe { S::pair_d(self.0, second.0) })
     }
 }
 

@@ -3,6 +3,7 @@
 use super::arithmetic::{Doubles, Floats, cross, dot};
 use super::buffer::Buffer;
 use super::planes::{Corners, Frame, MARGIN, Planes, sum_between};
+use super::run::OfRun;
 use super::tile::{Found, Sums};
 use crate::paper::refill;
 use crate::simd::{GROUP, Groups, Simd};
@@ -63,9 +64,11 @@ impl Places {
 impl Sums for HalfWindows {
     type OfLanes<S: Simd> = Tangents<Floats<S>>;
     type Of1 = Tangents<f32>;
+    type OfRun = OfRun<f32, 6>;
 
     const COLUMN: usize = size_of::<f64>();
     const CURVATURE: bool = false;
+    const PAIRS: bool = true;
 
     fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, _origin: [f32; 3]) {
         self.pushed = frame.start_ring(1, &mut self.integrals);
@@ -149,16 +152,6 @@ impl Sums for HalfWindows {
     }
 
     #[inline(always)]
-    fn pair<S: Groups>(
-        first: Self::OfLanes<S>,
-        second: Self::OfLanes<S>,
-    ) -> Self::OfLanes<S::Pair> {
-        let [[a, b, c], [d, e, f]] = first;
-        let [[g, h, i], [j, k, l]] = second;
-        [[a.pair(g), b.pair(h), c.pair(i)], [d.pair(j), e.pair(k), f.pair(l)]]
-    }
-
-    #[inline(always)]
     unsafe fn none<S: Simd>() -> Self::OfLanes<S> {
         // SAFETY: as the caller's.
         [[unsafe { Floats::splat(0.0) }; 3]; 2]
@@ -223,17 +216,24 @@ impl Sums for HalfWindows {
     }
 
     #[inline(always)]
+    unsafe fn note<S: Simd>(tangents: Tangents<Floats<S>>, run: &mut OfRun<f32, 6>, at: usize) {
+        let [[a, b, c], [d, e, f]] = tangents;
+        // SAFETY: as the caller's.
+        unsafe { run.store::<S>(at, [a, b, c, d, e, f]) }
+    }
+
+    #[inline(always)]
     unsafe fn estimate<S: Simd>(
         &self,
-        _frame: &Frame,
-        tangents: &Self::OfLanes<S>,
+        run: &OfRun<f32, 6>,
+        at: usize,
         sides: S::F,
-        _lanes: u32,
-        _fresh: u32,
+        _fresh: bool,
     ) -> Found<S> {
-        let [h, v] = *tangents;
         // SAFETY: as the caller's.
         unsafe {
+            let [hx, hy, hz, vx, vy, vz] = run.load::<S>(at);
+            let (h, v) = ([hx, hy, hz], [vx, vy, vz]);
             let n = cross(h, v);
             let n2 = dot(n, n);
             let (h2, v2) = (dot(h, h), dot(v, v));

@@ -12,6 +12,7 @@ mod moments;
 pub(crate) mod paper;
 mod paths;
 mod planes;
+mod run;
 mod sink;
 mod strips;
 mod tile;

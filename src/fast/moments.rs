@@ -3,8 +3,10 @@
 
 use super::arithmetic::{Doubles, Floats, dot};
 use super::buffer::Buffer;
+use super::lanes::LANES;
 use super::planes::{Corners, Frame, MARGIN, Planes, sum_between};
-use super::tile::{Found, Sums};
+use super::run::{OfRun, RUN};
+use super::tile::{Bits, Found, Sums};
 use crate::cloud::Points;
 use crate::paper::{ROUNDING, refill};
 use crate::simd::{GROUP, Groups, Simd};
@@ -49,6 +51,7 @@ impl WindowMoments<f64> {
 }
 
 /// The sums of points' moments about the first of them, and the number of points.
+#[cold]
 pub(crate) fn sum_of_moments(points: impl Iterator<Item = [f64; 3]>) -> ([f64; CHANNELS], f64) {
     let (mut sums, mut count) = ([0.0; CHANNELS], 0.0);
     let mut origin = None;
@@ -84,9 +87,11 @@ const DOUBT_PLANE: f32 = 1e-5;
 impl Sums for Moments {
     type OfLanes<S: Simd> = WindowMoments<Doubles<S>>;
     type Of1 = WindowMoments<f64>;
+    type OfRun = Matrices;
 
     const COLUMN: usize = CHANNELS * size_of::<f64>();
     const CURVATURE: bool = true;
+    const PAIRS: bool = false;
 
     fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, origin: [f32; 3]) {
         self.pushed = frame.start_ring(CHANNELS, &mut self.integrals);
@@ -185,18 +190,6 @@ impl Sums for Moments {
     }
 
     #[inline(always)]
-    fn pair<S: Groups>(
-        first: Self::OfLanes<S>,
-        second: Self::OfLanes<S>,
-    ) -> Self::OfLanes<S::Pair> {
-        let mut sums = [first.sums[0].pair(second.sums[0]); CHANNELS];
-        for c in 1..CHANNELS {
-            sums[c] = first.sums[c].pair(second.sums[c]);
-        }
-        WindowMoments { sums, share: first.share.pair(second.share) }
-    }
-
-    #[inline(always)]
     unsafe fn none<S: Simd>() -> Self::OfLanes<S> {
         // SAFETY: as the caller's.
         let zero = unsafe { Doubles::splat(0.0) };
@@ -245,106 +238,211 @@ impl Sums for Moments {
         }
     }
 
-    #[cold]
-    fn afresh(
+    #[inline(always)]
+    unsafe fn afresh<S: Groups>(
         points: &Points,
         image: &Image,
-        (x, y): (usize, usize),
-        side: usize,
-    ) -> Option<Self::Of1> {
-        let half = (side / 2) as isize;
-        let window = (x as isize - half, y as isize - half);
-        let pixels = image.rects(window, (side, side)).flat_map(|rect| rect.pixels());
-        let (sums, count) = sum_of_moments(pixels.map(|(x, y)| points.at(x, y).map(f64::from)));
-        Some(WindowMoments::of(sums, count))
+        windows: impl Fn(usize) -> ((usize, usize), usize),
+        lanes: u32,
+        run: &mut Matrices,
+        at: usize,
+    ) -> u32 {
+        let sum_up = |lane: usize| {
+            let ((x, y), side) = windows(lane);
+            let half = (side / 2) as isize;
+            let window = (x as isize - half, y as isize - half);
+            let pixels = image.rects(window, (side, side)).flat_map(|rect| rect.pixels());
+            sum_of_moments(pixels.map(|(x, y)| points.at(x, y).map(f64::from)))
+        };
+        // SAFETY: as the caller's.
+        unsafe { run.note_afresh::<S>(at, lanes, sum_up) };
+        lanes
+    }
+
+    #[inline(always)]
+    unsafe fn note<S: Simd>(moments: WindowMoments<Doubles<S>>, run: &mut Matrices, at: usize) {
+        // SAFETY: as the caller's.
+        unsafe { run.note(&moments, at) }
+    }
+
+    #[inline(always)]
+    unsafe fn solve<S: Groups>(run: &mut Matrices, at: usize, lanes: &[u32]) {
+        // SAFETY: as the caller's.
+        unsafe { run.solve::<S>(at, lanes) }
     }
 
     #[inline(always)]
     unsafe fn estimate<S: Simd>(
         &self,
-        _frame: &Frame,
-        moments: &Self::OfLanes<S>,
+        run: &Matrices,
+        at: usize,
         _sides: S::F,
-        lanes: u32,
-        fresh: u32,
+        fresh: bool,
     ) -> Found<S> {
         // SAFETY: as the caller's.
-        unsafe { plane(moments, self.error, lanes, fresh) }
+        unsafe { run.normals(at, if fresh { 0.0 } else { self.error }) }
     }
 }
 
-/// The eigenvector of the smallest eigenvalue: the least root of the characteristic polynomial in closed form, made
-/// precise by Newton steps, then a column of the adjugate. `error` is what the rounding errors of the sums of all but
-/// `fresh` lanes stay below; other lanes than `lanes` mean nothing.
-///
-/// # Safety
-/// The processor has the instruction set of `S`.
-#[inline(always)]
-pub(crate) unsafe fn plane<S: Simd>(
-    moments: &WindowMoments<Doubles<S>>,
-    error: f64,
-    lanes: u32,
-    fresh: u32,
-) -> Found<S> {
-    // SAFETY: as the caller's.
-    unsafe {
-        let [x, y, z, xx, xy, xz, yy, yz, zz] = moments.sums;
-        let (mx, my, mz) = (x * moments.share, y * moments.share, z * moments.share);
-        let (xx, xy, xz) = (xx - x * mx, xy - x * my, xz - x * mz);
-        let (yy, yz, zz) = (yy - y * my, yz - y * mz, zz - z * mz);
-        // A trace next to 1: floats divide in a quarter of the time.
-        let trace = xx + yy + zz;
-        let scale = (Floats::splat(1.0) / trace.narrow()).widen();
-        let (xx, xy, xz) = (xx * scale, xy * scale, xz * scale);
-        let (yy, yz, zz) = (yy * scale, yz * scale, zz * scale);
+/// The covariance matrices of a run's windows (Eq. 25), over their traces, and the smallest eigenvalues.
+#[derive(Default)]
+pub(crate) struct Matrices {
+    /// xx, xy, xz, yy, yz, zz
+    elements: OfRun<f64, 6>,
+    trace: OfRun<f32, 1>,
+    /// c0, c1 and c2 of the characteristic polynomial, value^3 - c2 value^2 + c1 value - c0.
+    polynomial: OfRun<f64, 3>,
+    /// Its least root, its slope there, and the lanes of pairs of groups that are not sure of them.
+    value: OfRun<f64, 1>,
+    slope: OfRun<f32, 1>,
+    unsettled: [u32; RUN / LANES],
+}
 
-        // value^3 - c2 value^2 + c1 value - c0 = 0
-        let (minor_x, minor_y, minor_z) = (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
-        let c2 = xx + yy + zz;
-        let c1 = minor_x + minor_y + minor_z;
-        let c0 = xx * minor_x + xy * (xz * yz - xy * zz) + xz * (xy * yz - xz * yy);
-        let mut value = least_root([c0.narrow(), c1.narrow(), c2.narrow()]).widen();
-        let twice = c2 + c2;
-        let (three, converged) = (Doubles::splat(3.0), Floats::splat(CONVERGED));
-        let (mut slope, mut unsettled) = (Floats::splat(0.0), lanes);
-        for _ in 0..STEPS {
-            slope = ((three * value - twice) * value + c1).narrow();
-            // The steps grow small: floats tell how far they go.
-            let off = (((value - c2) * value + c1) * value - c0).narrow();
-            value = value - (off / slope).widen();
-            unsettled = !off.abs().lt(converged * slope * slope.abs()) & lanes;
-            if unsettled == 0 {
-                break;
+impl Matrices {
+    /// The matrices of windows with these moments, for the pixels from `at` on, and their polynomials.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`; the pixels are in the run.
+    #[inline(always)]
+    pub unsafe fn note<S: Simd>(&mut self, moments: &WindowMoments<Doubles<S>>, at: usize) {
+        // SAFETY: as the caller's.
+        unsafe {
+            let [x, y, z, xx, xy, xz, yy, yz, zz] = moments.sums;
+            let (mx, my, mz) = (x * moments.share, y * moments.share, z * moments.share);
+            let (xx, xy, xz) = (xx - x * mx, xy - x * my, xz - x * mz);
+            let (yy, yz, zz) = (yy - y * my, yz - y * mz, zz - z * mz);
+            // A trace next to 1: floats divide in a quarter of the time.
+            let trace = (xx + yy + zz).narrow();
+            let scale = (Floats::splat(1.0) / trace).widen();
+            let (xx, xy, xz) = (xx * scale, xy * scale, xz * scale);
+            let (yy, yz, zz) = (yy * scale, yz * scale, zz * scale);
+            let (minor_x, minor_y, minor_z) =
+                (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
+            let c2 = xx + yy + zz;
+            let c1 = minor_x + minor_y + minor_z;
+            let c0 = xx * minor_x + xy * (xz * yz - xy * zz) + xz * (xy * yz - xz * yy);
+            self.elements.store::<S>(at, [xx, xy, xz, yy, yz, zz]);
+            self.trace.store::<S>(at, [trace]);
+            self.polynomial.store::<S>(at, [c0, c1, c2]);
+        }
+    }
+
+    /// As [`Matrices::note`], of some lanes of a pair of groups; `sum_up` gives the moments of a lane's window, and
+    /// the number of its points.
+    ///
+    /// # Safety
+    /// As [`Matrices::note`].
+    #[inline(always)]
+    pub unsafe fn note_afresh<S: Groups>(
+        &mut self,
+        at: usize,
+        lanes: u32,
+        sum_up: impl Fn(usize) -> ([f64; CHANNELS], f64),
+    ) {
+        let (mut sums, mut shares) = ([[0.0; LANES]; CHANNELS], [0.0; LANES]);
+        for lane in Bits(lanes) {
+            let (moments, count) = sum_up(lane);
+            for c in 0..CHANNELS {
+                sums[c][lane] = moments[c];
+            }
+            shares[lane] = 1.0 / count;
+        }
+        for group in (0..LANES).step_by(GROUP) {
+            // SAFETY: as the caller's; the arrays hold whole groups.
+            unsafe {
+                let share = Doubles(S::load_d(shares.as_ptr().add(group)));
+                let mut of8 = [share; CHANNELS];
+                for c in 0..CHANNELS {
+                    of8[c] = Doubles(S::load_d(sums[c].as_ptr().add(group)));
+                }
+                self.note::<S>(&WindowMoments { sums: of8, share }, at + group);
             }
         }
-        let value = value.max(Doubles::splat(0.0));
+    }
 
-        // The adjugate of the matrix less the eigenvalue: each column is along the eigenvector.
-        let (xx, yy, zz) = (xx - value, yy - value, zz - value);
-        let (a_xx, a_yy, a_zz) = (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
-        let (a_xy, a_xz, a_yz) = (xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz);
-        let (a_xx, a_yy, a_zz) = (a_xx.narrow(), a_yy.narrow(), a_zz.narrow());
-        let (a_xy, a_xz, a_yz) = (a_xy.narrow(), a_xz.narrow(), a_yz.narrow());
-        // The column with the longest diagonal element.
-        let columns = [[a_xx, a_xy, a_xz], [a_xy, a_yy, a_yz], [a_xz, a_yz, a_zz]];
-        let best_xy = a_xx.max(a_yy);
-        let (is_y, is_z) = (S::lt(a_xx.0, a_yy.0), S::lt(best_xy.0, a_zz.0));
-        let mut n = [Floats::splat(0.0); 3];
-        for c in 0..3 {
-            let of_xy = S::select(is_y, columns[1][c].0, columns[0][c].0);
-            n[c] = Floats(S::select(is_z, columns[2][c].0, of_xy));
+    /// The smallest eigenvalues of the matrices from `at` on in the run, for `lanes` of each pair of groups: the least
+    /// roots in closed form, made precise by Newton steps.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn solve<S: Groups>(&mut self, at: usize, lanes: &[u32]) {
+        for (at, lanes) in (at..).step_by(LANES).zip(lanes).filter(|(_, lanes)| **lanes != 0) {
+            // SAFETY: as the caller's.
+            self.unsettled[at / LANES] = unsafe { self.least_roots::<S::Pair>(at, *lanes) };
         }
-        let scale = Floats::splat(1.0) / dot(n, n).sqrt();
-        let value = value.narrow();
-        let least = Floats::splat((DOUBT_SUMS * error) as f32);
-        // Where the points lie on a line, the steps may end at the largest eigenvalue instead.
-        let is_smallest = value.lt(Floats::splat(1.0 / 3.0));
-        let sums = least.lt(slope * trace.narrow()) | fresh;
-        let sure = Floats::splat(DOUBT_PLANE).lt(slope) & sums & is_smallest;
-        Found {
-            normal: [n[0] * scale, n[1] * scale, n[2] * scale],
-            curvature: value,
-            doubtful: !sure | unsettled,
+    }
+
+    /// Returns the lanes whose steps have not ended.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn least_roots<S: Simd>(&mut self, at: usize, lanes: u32) -> u32 {
+        // SAFETY: as the caller's.
+        unsafe {
+            let [c0, c1, c2] = self.polynomial.load::<S>(at);
+            let mut value = least_root([c0.narrow(), c1.narrow(), c2.narrow()]).widen();
+            let twice = c2 + c2;
+            let (three, converged) = (Doubles::splat(3.0), Floats::splat(CONVERGED));
+            let (mut slope, mut unsettled) = (Floats::splat(0.0), lanes);
+            for _ in 0..STEPS {
+                slope = ((three * value - twice) * value + c1).narrow();
+                // The steps grow small: floats tell how far they go.
+                let off = (((value - c2) * value + c1) * value - c0).narrow();
+                value = value - (off / slope).widen();
+                unsettled = !off.abs().lt(converged * slope * slope.abs()) & lanes;
+                if unsettled == 0 {
+                    break;
+                }
+            }
+            self.value.store::<S>(at, [value.max(Doubles::splat(0.0))]);
+            self.slope.store::<S>(at, [slope]);
+            unsettled
+        }
+    }
+
+    /// The eigenvectors of the smallest eigenvalues for the pixels from `at` on, which are solved: a column of the
+    /// adjugate. The rounding errors of the moments stay below `error`.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn normals<S: Simd>(&self, at: usize, error: f64) -> Found<S> {
+        // SAFETY: as the caller's.
+        unsafe {
+            let [xx, xy, xz, yy, yz, zz] = self.elements.load::<S>(at);
+            let [value] = self.value.load::<S>(at);
+            let ([slope], [trace]) = (self.slope.load::<S>(at), self.trace.load::<S>(at));
+            // The adjugate of the matrix less the eigenvalue: each column is along the eigenvector.
+            let (xx, yy, zz) = (xx - value, yy - value, zz - value);
+            let (a_xx, a_yy, a_zz) = (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
+            let (a_xy, a_xz, a_yz) = (xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz);
+            let (a_xx, a_yy, a_zz) = (a_xx.narrow(), a_yy.narrow(), a_zz.narrow());
+            let (a_xy, a_xz, a_yz) = (a_xy.narrow(), a_xz.narrow(), a_yz.narrow());
+            // The column with the longest diagonal element.
+            let columns = [[a_xx, a_xy, a_xz], [a_xy, a_yy, a_yz], [a_xz, a_yz, a_zz]];
+            let best_xy = a_xx.max(a_yy);
+            let (is_y, is_z) = (S::lt(a_xx.0, a_yy.0), S::lt(best_xy.0, a_zz.0));
+            let mut n = [Floats::splat(0.0); 3];
+            for c in 0..3 {
+                let of_xy = S::select(is_y, columns[1][c].0, columns[0][c].0);
+                n[c] = Floats(S::select(is_z, columns[2][c].0, of_xy));
+            }
+            let scale = Floats::splat(1.0) / dot(n, n).sqrt();
+            let value = value.narrow();
+            let least = Floats::splat((DOUBT_SUMS * error) as f32);
+            // Where the points lie on a line, the steps may end at the largest eigenvalue instead.
+            let is_smallest = value.lt(Floats::splat(1.0 / 3.0));
+            let sums = least.lt(slope * trace);
+            let sure = Floats::splat(DOUBT_PLANE).lt(slope) & sums & is_smallest;
+            // Of the pair's groups, these pixels'.
+            let unsettled = self.unsettled[at / LANES] >> (at % LANES);
+            Found {
+                normal: [n[0] * scale, n[1] * scale, n[2] * scale],
+                curvature: value,
+                doubtful: !sure | unsettled,
+            }
         }
     }
 }

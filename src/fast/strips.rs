@@ -8,6 +8,7 @@
 use super::arithmetic::{Floats, cross, dot};
 use super::buffer::Buffer;
 use super::planes::{Corners, Frame, MARGIN, Planes};
+use super::run::OfRun;
 use super::tile::{Found, Sums};
 use crate::paper::refill;
 use crate::simd::{GROUP, Groups, Simd};
@@ -55,9 +56,11 @@ impl<const SIMPLE: bool> Strips<SIMPLE> {
 impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     type OfLanes<S: Simd> = Gradients<S::I>;
     type Of1 = Gradients<i32>;
+    type OfRun = OfRun<i32, 6>;
 
     const COLUMN: usize = 6 * size_of::<i32>();
     const CURVATURE: bool = false;
+    const PAIRS: bool = true;
 
     fn start(&mut self, frame: &Frame, limit: f32, side: usize, _origin: [f32; 3]) {
         self.pushed = frame.start_ring(3, &mut self.columns);
@@ -167,18 +170,6 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     }
 
     #[inline(always)]
-    fn pair<S: Groups>(
-        first: Self::OfLanes<S>,
-        second: Self::OfLanes<S>,
-    ) -> Self::OfLanes<S::Pair> {
-        // SAFETY: there are groups, so there is the instruction set.
-        let both = |a, b| unsafe { S::pair_i(a, b) };
-        let [[a, b, c], [d, e, f]] = first;
-        let [[g, h, i], [j, k, l]] = second;
-        [[both(a, g), both(b, h), both(c, i)], [both(d, j), both(e, k), both(f, l)]]
-    }
-
-    #[inline(always)]
     unsafe fn none<S: Simd>() -> Self::OfLanes<S> {
         // SAFETY: as the caller's.
         [[unsafe { S::splat_i(0) }; 3]; 2]
@@ -228,17 +219,24 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     }
 
     #[inline(always)]
+    unsafe fn note<S: Simd>(sums: Gradients<S::I>, run: &mut OfRun<i32, 6>, at: usize) {
+        let [[a, b, c], [d, e, f]] = sums;
+        // SAFETY: as the caller's.
+        unsafe { run.store::<S>(at, [a, b, c, d, e, f]) }
+    }
+
+    #[inline(always)]
     unsafe fn estimate<S: Simd>(
         &self,
-        _frame: &Frame,
-        sums: &Self::OfLanes<S>,
+        run: &OfRun<i32, 6>,
+        at: usize,
         sides: S::F,
-        _lanes: u32,
-        _fresh: u32,
+        _fresh: bool,
     ) -> Found<S> {
         // SAFETY: as the caller's.
         unsafe {
-            let [h, v] = [float::<S>(sums[0]), float::<S>(sums[1])];
+            let [hx, hy, hz, vx, vy, vz] = run.load::<S>(at);
+            let [h, v] = [float::<S>([hx, hy, hz]), float::<S>([vx, vy, vz])];
             let n = cross(v, h);
             let (n2, h2, v2) = (dot(n, n), dot(h, h), dot(v, v));
             let rounding = Floats(sides) * Floats::splat(DOUBT_ROUNDING) * (h2 + v2);

@@ -4,7 +4,9 @@
 use std::ops::{Range, RangeInclusive};
 
 use super::arithmetic::{Floats, dot};
+use super::lanes::LANES;
 use super::planes::{Frame, MARGIN, Planes};
+use super::run::RUN;
 use super::sink::Sink;
 use crate::cloud::Points;
 use crate::methods::{Estimate, estimate};
@@ -21,18 +23,38 @@ pub(crate) struct Found<S: Simd> {
     pub doubtful: u32,
 }
 
+impl<S: Simd> Found<S> {
+    /// Takes the normals and curvatures of some lanes of another.
+    #[inline(always)]
+    pub fn take(&mut self, lanes: u32, other: &Self) {
+        // SAFETY: there is a group, so there is the instruction set.
+        unsafe {
+            let mask = S::mask(lanes);
+            for c in 0..3 {
+                self.normal[c].0 = S::select(mask, other.normal[c].0, self.normal[c].0);
+            }
+            self.curvature.0 = S::select(mask, other.curvature.0, self.curvature.0);
+        }
+    }
+}
+
 /// A method's sums over windows, from rings of integral rows. Each method says what it keeps a ring of.
 pub(crate) trait Sums {
     /// The sums of as many windows as there are lanes.
     type OfLanes<S: Simd>: Copy;
     /// The sums of one window.
     type Of1;
+    /// What the normals of a run of pixels are made from.
+    type OfRun: Default;
 
     /// Bytes a column of a ring's row takes.
     const COLUMN: usize;
 
     /// Whether the method gives a curvature.
     const CURVATURE: bool;
+
+    /// Whether pairs of groups are summed as such: not where a group's sums fill the registers.
+    const PAIRS: bool;
 
     /// Makes room, and forgets the rows pushed before. `limit` bounds the coordinates, `side` the windows.
     fn start(&mut self, frame: &Frame, limit: f32, side: usize, origin: [f32; 3]);
@@ -84,10 +106,6 @@ pub(crate) trait Sums {
         side: usize,
     ) -> Option<Self::Of1>;
 
-    /// Two groups' sums.
-    fn pair<S: Groups>(first: Self::OfLanes<S>, second: Self::OfLanes<S>)
-    -> Self::OfLanes<S::Pair>;
-
     /// Sums to put lanes into.
     ///
     /// # Safety
@@ -100,29 +118,47 @@ pub(crate) trait Sums {
     /// As [`Sums::push`].
     unsafe fn put<S: Simd>(sums: &mut Self::OfLanes<S>, lane: usize, one: Self::Of1);
 
-    /// The sums of one window from its points, without the rings' rounding; none if that is left to the plain form.
-    fn afresh(
+    /// Notes windows of some lanes of a pair of groups, which is `at` in its run, from their points, without the rings'
+    /// rounding; returns which: the others are left to the plain form. What was noted of the pair before is lost.
+    /// `windows` gives a lane's pixel and side.
+    ///
+    /// # Safety
+    /// As [`Sums::push`].
+    unsafe fn afresh<S: Groups>(
         _points: &Points,
         _image: &Image,
-        _pixel: (usize, usize),
-        _side: usize,
-    ) -> Option<Self::Of1> {
-        None
+        _windows: impl Fn(usize) -> ((usize, usize), usize),
+        _lanes: u32,
+        _run: &mut Self::OfRun,
+        _at: usize,
+    ) -> u32 {
+        0
     }
 
-    /// The estimates from the sums; `sides` are the sides of the windows. Only these `lanes` have sums: the others
-    /// hold anything, and may not have a say in these lanes' estimates. Those of `fresh` lanes are from
-    /// [`Sums::afresh`].
+    /// Notes what the normals of the pixels from `at` on in a run are made from.
+    ///
+    /// # Safety
+    /// As [`Sums::push`].
+    unsafe fn note<S: Simd>(sums: Self::OfLanes<S>, run: &mut Self::OfRun, at: usize);
+
+    /// Goes as far with normals as has no other use of their windows: those of the pairs of groups from `at` on in a
+    /// run, with `lanes` of each that have been noted: the others hold anything.
+    ///
+    /// # Safety
+    /// As [`Sums::push`].
+    unsafe fn solve<S: Groups>(_run: &mut Self::OfRun, _at: usize, _lanes: &[u32]) {}
+
+    /// The estimates of the pixels from `at` on in a run, which are solved; `sides` are those of their windows. Whether
+    /// their sums are from [`Sums::afresh`], `fresh` tells.
     ///
     /// # Safety
     /// As [`Sums::push`].
     unsafe fn estimate<S: Simd>(
         &self,
-        frame: &Frame,
-        sums: &Self::OfLanes<S>,
+        run: &Self::OfRun,
+        at: usize,
         sides: S::F,
-        lanes: u32,
-        fresh: u32,
+        fresh: bool,
     ) -> Found<S>;
 }
 
@@ -176,6 +212,7 @@ impl Tile<'_> {
         planes.resize(frame);
         let origin = self.origin(sides);
         sums.start(frame, self.limit, side, origin);
+        let mut run = Run::default();
 
         let mut next = top;
         let mut hidden = false;
@@ -196,7 +233,9 @@ impl Tile<'_> {
             sums.aim(frame, y, side);
             let inner = self.inner(side, y);
             // SAFETY: as the caller's.
-            unsafe { self.row::<S, M>(frame, planes, sums, sides, sink, y, &inner, hidden) };
+            unsafe {
+                self.row::<S, M>(frame, planes, sums, sides, sink, &mut run, y, &inner, hidden);
+            }
         }
         Ok(())
     }
@@ -250,89 +289,103 @@ impl Tile<'_> {
         sums: &M,
         sides: &impl Fn(usize) -> &'r [f32],
         sink: &Sink,
+        run: &mut Run<M>,
         y: usize,
         inner: &Range<usize>,
         hidden: bool,
     ) {
         let row = sides(y);
-        let planes_row = planes.rows(frame, y);
-        for x in self.columns.clone().step_by(2 * GROUP) {
-            // SAFETY: as the caller's; a row of sides is readable up to a whole pair of groups.
-            unsafe {
-                let count = (self.columns.end - x).min(2 * GROUP);
-                let pair = [
-                    Group::<S>::new(self, row, x, y, inner),
-                    Group::new(self, row, x + GROUP, y, inner),
-                ];
-                let windows = pair[0].windows | pair[1].windows << GROUP;
-                if windows == 0 {
-                    sink.write_none(x, y, count);
-                    continue;
-                }
-                let (mut estimates, plain) = if hidden {
-                    (Estimates::NONE, windows)
-                } else {
-                    let (mut of16, left) = self.pair::<S, M>(frame, planes, sums, sides, &pair);
-                    let group_sides = S::pair(pair[0].sides, pair[1].sides);
-                    let (mut fresh, lanes) = (0, windows & !left);
-                    let found = loop {
-                        let found =
-                            sums.estimate::<S::Pair>(frame, &of16, group_sides, lanes, fresh);
-                        let again = found.doubtful & lanes & !fresh;
-                        let tried = self.afresh::<S, M>(&mut of16, row, x, y, again);
-                        if tried == 0 {
-                            break found;
-                        }
-                        fresh |= tried;
-                    };
-                    let plain = left | found.doubtful & windows;
-                    let column = frame.column(x);
-                    let point = [
-                        Floats::load(planes_row[0].as_ptr().add(column)),
-                        Floats::load(planes_row[1].as_ptr().add(column)),
-                        Floats::load(planes_row[2].as_ptr().add(column)),
+        for start in self.columns.clone().step_by(RUN) {
+            run.length = 0;
+            for x in (start..self.columns.end.min(start + RUN)).step_by(LANES) {
+                // SAFETY: as the caller's; a row of sides is readable up to a whole pair of groups.
+                unsafe {
+                    let pair = [
+                        Group::<S>::new(self, row, x, y, inner),
+                        Group::new(self, row, x + GROUP, y, inner),
                     ];
-                    let viewpoint = self.options.viewpoint;
-                    (Estimates::of(found, point, viewpoint, windows & !plain), plain)
-                };
-                if plain != 0 {
-                    self.plain_lanes(&mut estimates, row, (x, y), plain);
+                    let windows = pair[0].windows | pair[1].windows << GROUP;
+                    if windows == 0 {
+                        sink.write_none(x, y, (self.columns.end - x).min(LANES));
+                        continue;
+                    }
+                    let at = run.length * LANES;
+                    let plain = if hidden {
+                        windows
+                    } else {
+                        self.pair::<S, M>(frame, planes, sums, sides, &pair, &mut run.sums, at)
+                    };
+                    run.places[run.length] = (x, windows);
+                    run.lanes[run.length] = windows & !plain;
+                    run.length += 1;
                 }
-                sink.write(x, y, count, &estimates, M::CURVATURE);
             }
+            // SAFETY: as the caller's.
+            unsafe { self.finish::<S, M>(frame, planes, sums, row, sink, run, y) };
         }
     }
 
-    /// Replaces the sums of some lanes by those from the points; returns which.
+    /// Writes the normals of a run in row `y`.
     ///
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn afresh<S: Groups, M: Sums>(
+    #[allow(clippy::too_many_arguments)]
+    unsafe fn finish<S: Groups, M: Sums>(
         &self,
-        of16: &mut M::OfLanes<S::Pair>,
-        sides: &[f32],
-        x: usize,
+        frame: &Frame,
+        planes: &Planes,
+        sums: &M,
+        row: &[f32],
+        sink: &Sink,
+        run: &mut Run<M>,
         y: usize,
-        lanes: u32,
-    ) -> u32 {
-        let mut tried = 0;
-        for lane in Bits(lanes) {
-            let side = sides[x + lane] as usize;
-            if let Some(one) = M::afresh(self.points, self.image, (x + lane, y), side) {
-                // SAFETY: as the caller's.
-                unsafe { M::put::<S::Pair>(of16, lane, one) };
-                tried |= 1 << lane;
+    ) {
+        let planes_row = planes.rows(frame, y);
+        let Run { sums: of_run, places, lanes, length } = run;
+        // SAFETY: as the caller's; the rows are readable up to a whole pair of groups.
+        unsafe {
+            M::solve::<S>(of_run, 0, &lanes[..*length]);
+            for number in 0..*length {
+                let (x, windows) = places[number];
+                let at = number * LANES;
+                let sides = S::Pair::load(row.as_ptr().add(x));
+                let mut found = sums.estimate::<S::Pair>(of_run, at, sides, false);
+                let doubtful = found.doubtful & lanes[number];
+                let mut plain = windows & !lanes[number] | doubtful;
+                if doubtful != 0 {
+                    let window = |lane: usize| ((x + lane, y), row[x + lane] as usize);
+                    let (points, image) = (self.points, self.image);
+                    let tried = M::afresh::<S>(points, image, window, doubtful, of_run, at);
+                    if tried != 0 {
+                        M::solve::<S>(of_run, at, &[tried]);
+                        let fresh = sums.estimate::<S::Pair>(of_run, at, sides, true);
+                        found.take(tried, &fresh);
+                        plain &= !tried | fresh.doubtful;
+                    }
+                }
+                let column = frame.column(x);
+                let point = [
+                    Floats::load(planes_row[0].as_ptr().add(column)),
+                    Floats::load(planes_row[1].as_ptr().add(column)),
+                    Floats::load(planes_row[2].as_ptr().add(column)),
+                ];
+                let viewpoint = self.options.viewpoint;
+                let mut estimates = Estimates::of(found, point, viewpoint, windows & !plain);
+                if plain != 0 {
+                    self.plain_lanes(&mut estimates, row, (x, y), plain);
+                }
+                let count = (self.columns.end - x).min(LANES);
+                sink.write(x, y, count, &estimates, M::CURVATURE);
             }
         }
-        tried
     }
 
     /// The normals of some lanes of those that begin with pixel `(x, y)`, by the plain form.
     #[cold]
     fn plain_lanes(
         &self,
-        estimates: &mut Estimates<{ 2 * GROUP }>,
+        estimates: &mut Estimates<LANES>,
         row: &[f32],
         (x, y): (usize, usize),
         lanes: u32,
@@ -347,11 +400,13 @@ impl Tile<'_> {
         }
     }
 
-    /// The sums of the windows of two groups side by side, and the lanes whose windows are left to the plain form.
+    /// Notes the sums of the windows of two groups side by side, the first of which is `at` in its run; returns the
+    /// lanes whose windows are left to the plain form.
     ///
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
     unsafe fn pair<'r, S: Groups, M: Sums>(
         &self,
         frame: &Frame,
@@ -359,18 +414,30 @@ impl Tile<'_> {
         sums: &M,
         sides: &impl Fn(usize) -> &'r [f32],
         groups: &[Group<S>; 2],
-    ) -> (M::OfLanes<S::Pair>, u32) {
+        run: &mut M::OfRun,
+        at: usize,
+    ) -> u32 {
         let [first, second] = groups;
         // SAFETY: as the caller's; the frame holds the largest side around every pixel of the tile.
         unsafe {
             if let (Some(side), Some(other)) = (first.one_side(), second.one_side())
                 && side == other
             {
-                return (sums.of_pixels::<S::Pair>(frame, planes, first.x, side), 0);
+                if M::PAIRS {
+                    let both = sums.of_pixels::<S::Pair>(frame, planes, first.x, side);
+                    M::note::<S::Pair>(both, run, at);
+                } else {
+                    M::note::<S>(sums.of_pixels::<S>(frame, planes, first.x, side), run, at);
+                    let second = sums.of_pixels::<S>(frame, planes, second.x, side);
+                    M::note::<S>(second, run, at + GROUP);
+                }
+                return 0;
             }
             let first = self.group::<S, M>(frame, planes, sums, sides, first);
+            M::note::<S>(first.0, run, at);
             let second = self.group::<S, M>(frame, planes, sums, sides, second);
-            (M::pair::<S>(first.0, second.0), first.1 | second.1 << GROUP)
+            M::note::<S>(second.0, run, at + GROUP);
+            first.1 | second.1 << GROUP
         }
     }
 
@@ -523,6 +590,25 @@ fn halves(range: &Range<usize>) -> (Range<usize>, Range<usize>) {
 #[inline(always)]
 fn contains(range: &Range<usize>, other: RangeInclusive<usize>) -> bool {
     range.start <= *other.start() && *other.end() < range.end
+}
+
+/// Pixels of a row, without pairs of groups that have no window. Their normals are found step by step, each step for
+/// all of them: what one pixel's step waits for does not hold up the others'.
+struct Run<M: Sums> {
+    sums: M::OfRun,
+    /// Where the pairs begin, and the lanes that have a window.
+    places: [(usize, u32); RUN / LANES],
+    /// The lanes that are not left to the plain form.
+    lanes: [u32; RUN / LANES],
+    /// In pairs.
+    length: usize,
+}
+
+impl<M: Sums> Default for Run<M> {
+    fn default() -> Self {
+        let (places, lanes) = ([(0, 0); RUN / LANES], [0; RUN / LANES]);
+        Run { sums: M::OfRun::default(), places, lanes, length: 0 }
+    }
 }
 
 /// Eight pixels of a row and their windows.

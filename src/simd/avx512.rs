@@ -106,19 +106,6 @@ impl Groups for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn pair(first: Self::F, second: Self::F) -> __m512 {
-        unsafe { _mm512_insertf32x8::<1>(_mm512_castps256_ps512(first), second) }
-    }
-    #[inline(always)]
-    unsafe fn pair_i(first: Self::I, second: Self::I) -> __m512i {
-        unsafe { _mm512_inserti32x8::<1>(_mm512_castsi256_si512(first), second) }
-    }
-    #[inline(always)]
-    unsafe fn pair_d(first: Self::D, second: Self::D) -> [__m512d; 2] {
-        [first, second]
-    }
-
-    #[inline(always)]
     unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
         unsafe {
             let low = _mm512_castpd256_pd512(_mm256_loadu_pd(low));
@@ -241,6 +228,9 @@ impl Simd for Avx512Pair {
     }
     #[inline(always)]
     unsafe fn narrow(a: Self::D) -> Self::F {
-        unsafe { Avx512::pair(Avx512::narrow(a[0]), Avx512::narrow(a[1])) }
+        unsafe {
+            let low = _mm512_castps256_ps512(Avx512::narrow(a[0]));
+            _mm512_insertf32x8::<1>(low, Avx512::narrow(a[1]))
+        }
     }
 }

@@ -134,10 +134,6 @@ pub(crate) trait Groups: Simd {
     /// [`Twice`]: twice::Twice
     type Pair: Simd;
 
-    unsafe fn pair(first: Self::F, second: Self::F) -> <Self::Pair as Simd>::F;
-    unsafe fn pair_i(first: Self::I, second: Self::I) -> <Self::Pair as Simd>::I;
-    unsafe fn pair_d(first: Self::D, second: Self::D) -> <Self::Pair as Simd>::D;
-
     /// Lanes 0 to 3 from one place, 4 to 7 from another.
     unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F;
     /// Lane i of row j becomes lane j of row i, among lanes 0 to 3 and among lanes 4 to 7.

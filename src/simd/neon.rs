@@ -5,7 +5,7 @@
 
 use std::arch::aarch64::*;
 
-use super::twice::twice;
+use super::twice::Twice;
 use super::{GROUP, Groups, Simd};
 
 /// What every 64-bit Arm has.
@@ -294,7 +294,7 @@ impl Simd for Neon {
 }
 
 impl Groups for Neon {
-    twice!();
+    type Pair = Twice<Self>;
 
     #[inline(always)]
     unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {

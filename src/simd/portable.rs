@@ -1,6 +1,6 @@
 //! Eight lanes without any instruction set: what processors without a path of their own use.
 
-use super::twice::twice;
+use super::twice::Twice;
 use super::{GROUP, Groups, Simd};
 
 #[derive(Clone, Copy)]
@@ -252,7 +252,7 @@ impl Simd for Portable {
 }
 
 impl Groups for Portable {
-    twice!();
+    type Pair = Twice<Self>;
 
     #[inline(always)]
     unsafe fn load_halves(low: *const f32, high: *const f32) -> F {

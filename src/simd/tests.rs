@@ -133,7 +133,7 @@ unsafe fn of_lanes<S: Simd>(a: &[f32; 16], b: &[f32; 16]) -> Results {
     results
 }
 
-/// What is only done with groups, and pairs made of them.
+/// What is only done with groups.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
@@ -143,8 +143,7 @@ unsafe fn of_groups<S: Groups>(a: &[f32; 16], b: &[f32; 16]) -> Results {
     unsafe {
         let (x, y) = (S::load(a.as_ptr()), S::load(b.as_ptr()));
         let (dx, dy) = (S::widen(x), S::widen(y));
-        let [i, j] = small::<S>([x, y]);
-        let pair = S::pair(x, y);
+        let [i, _] = small::<S>([x, y]);
         results.floats::<S>([S::load_halves(b.as_ptr().add(3), a.as_ptr().add(1))]);
         results.floats::<S>(S::transpose_halves([x, y, S::add(x, x), S::add(y, y)]));
         results.integers::<S>([S::prefix_sum_i(i), S::last_i(i)]);
@@ -159,9 +158,6 @@ unsafe fn of_groups<S: Groups>(a: &[f32; 16], b: &[f32; 16]) -> Results {
             S::last_d(dx),
         ]);
         results.doubles::<S>(S::transpose_halves_d([dx, dy, S::add_d(dx, dx), S::add_d(dy, dy)]));
-        results.floats::<S::Pair>([pair]);
-        results.integers::<S::Pair>([S::pair_i(i, j)]);
-        results.doubles::<S::Pair>([S::pair_d(dx, dy)]);
     }
     results
 }

@@ -6,27 +6,6 @@ use super::Simd;
 #[derive(Clone, Copy)]
 pub(crate) struct Twice<S>(std::marker::PhantomData<S>);
 
-/// What makes pairs of an instruction set's groups two groups.
-macro_rules! twice {
-    () => {
-        type Pair = $crate::simd::twice::Twice<Self>;
-
-        #[inline(always)]
-        unsafe fn pair(first: Self::F, second: Self::F) -> [Self::F; 2] {
-            [first, second]
-        }
-        #[inline(always)]
-        unsafe fn pair_i(first: Self::I, second: Self::I) -> [Self::I; 2] {
-            [first, second]
-        }
-        #[inline(always)]
-        unsafe fn pair_d(first: Self::D, second: Self::D) -> [Self::D; 2] {
-            [first, second]
-        }
-    };
-}
-pub(crate) use twice;
-
 macro_rules! each {
     ($($name:ident($($operand:ident: $type:ident),*) -> $result:ident;)*) => {
         $(#[inline(always)]

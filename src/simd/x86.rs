@@ -5,7 +5,7 @@
 
 use std::arch::x86_64::*;
 
-use super::twice::twice;
+use super::twice::Twice;
 use super::{GROUP, Groups, Simd};
 
 /// What every x86-64 has.
@@ -241,7 +241,7 @@ impl Simd for Sse2 {
 }
 
 impl Groups for Sse2 {
-    twice!();
+    type Pair = Twice<Self>;
 
     #[inline(always)]
     unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {
@@ -516,7 +516,7 @@ impl Simd for Avx2 {
 }
 
 impl Groups for Avx2 {
-    twice!();
+    type Pair = Twice<Self>;
 
     #[inline(always)]
     unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {

@@ -4,13 +4,17 @@
 use super::integrals::{Channels, Counted};
 use super::rects::Rects;
 use crate::fast::arithmetic::{Doubles, Floats, cross, dot};
-use crate::fast::moments::{WindowMoments, plane, sum_of_moments};
+use crate::fast::moments::{Matrices, WindowMoments, sum_of_moments};
+use crate::fast::run::OfRun;
 use crate::fast::tile::{Bits, Found};
 use crate::paper::{CleanPoints, ROUNDING, Rect};
-use crate::simd::{GROUP, Groups};
+use crate::simd::{GROUP, Groups, Simd};
 
 /// A method's sums and normals.
 pub(crate) trait Sums<const N: usize>: Channels<N> {
+    /// What the normals of a run of pixels are made from.
+    type OfRun: Default;
+
     /// Whether the method gives a curvature.
     const CURVATURE: bool;
 
@@ -24,24 +28,47 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
     /// and no coordinate is above `largest`.
     fn error(total: [f64; N], count: usize, largest: f32) -> f64;
 
-    /// The normals from the sums over eight windows; only these `lanes` mean something, the `fresh` ones are from
-    /// [`Sums::afresh`].
+    /// Notes what the normals of eight pixels, `at` in their run, are made from: the sums over their windows. Only
+    /// these `lanes` mean something.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`; the rectangles are of a ring that has these points.
-    unsafe fn normals<S: Groups>(
+    unsafe fn note<S: Groups>(
         sums: &[Doubles<S>; N],
         rects: &Rects,
         points: &[Counted],
-        error: f64,
         lanes: u32,
-        fresh: u32,
-    ) -> Found<S>;
+        run: &mut Self::OfRun,
+        at: usize,
+    );
 
-    /// One window's sums from its points, without the rings' rounding; none if that is left to the plain form.
-    fn afresh(_points: &impl CleanPoints, _rect: &Rect) -> Option<[f64; N]> {
-        None
+    /// Notes windows of some lanes of a pair of groups, which is `at` in its run, from their points, without the rings'
+    /// rounding; returns which: the others are left to the plain form. What was noted of the pair before is lost.
+    ///
+    /// # Safety
+    /// As [`Sums::note`].
+    unsafe fn afresh<S: Groups>(
+        _points: &impl CleanPoints,
+        _rect: impl Fn(usize) -> Rect,
+        _lanes: u32,
+        _run: &mut Self::OfRun,
+        _at: usize,
+    ) -> u32 {
+        0
     }
+
+    /// Goes as far with normals as has no other use of their windows: those of the pairs of groups from `at` on in a
+    /// run, with `lanes` of each that have been noted.
+    ///
+    /// # Safety
+    /// As [`Sums::note`].
+    unsafe fn solve<S: Groups>(_run: &mut Self::OfRun, _at: usize, _lanes: &[u32]) {}
+
+    /// The normals of the pixels from `at` on in a run, which are solved.
+    ///
+    /// # Safety
+    /// As [`Sums::note`].
+    unsafe fn estimate<S: Simd>(run: &Self::OfRun, at: usize, error: f64) -> Found<S>;
 }
 
 /// CM: moments about a point of the tile.
@@ -80,6 +107,8 @@ impl Channels<MOMENTS> for CovarianceMatrix {
 }
 
 impl Sums<MOMENTS> for CovarianceMatrix {
+    type OfRun = Matrices;
+
     const CURVATURE: bool = true;
     const INNER: bool = false;
     const ENDS: bool = false;
@@ -89,27 +118,47 @@ impl Sums<MOMENTS> for CovarianceMatrix {
     }
 
     #[inline(always)]
-    unsafe fn normals<S: Groups>(
+    unsafe fn note<S: Groups>(
         sums: &[Doubles<S>; MOMENTS],
         _: &Rects,
         _: &[Counted],
-        error: f64,
-        lanes: u32,
-        fresh: u32,
-    ) -> Found<S> {
+        _: u32,
+        run: &mut Matrices,
+        at: usize,
+    ) {
         let [x, y, z, count, xx, yy, zz, _, xy, yz, xz, _] = *sums;
         let sums = [x, y, z, xx, xy, xz, yy, yz, zz];
         // SAFETY: as the caller's.
         unsafe {
             let share = Doubles::splat(1.0) / count;
-            plane(&WindowMoments { sums, share }, error, lanes, fresh)
+            run.note(&WindowMoments { sums, share }, at);
         }
     }
 
-    #[cold]
-    fn afresh(points: &impl CleanPoints, rect: &Rect) -> Option<[f64; MOMENTS]> {
-        let ([x, y, z, xx, xy, xz, yy, yz, zz], count) = sum_of_moments(points.finite(rect));
-        Some([x, y, z, count, xx, yy, zz, count, xy, yz, xz, count])
+    #[inline(always)]
+    unsafe fn afresh<S: Groups>(
+        points: &impl CleanPoints,
+        rect: impl Fn(usize) -> Rect,
+        lanes: u32,
+        run: &mut Matrices,
+        at: usize,
+    ) -> u32 {
+        let sum_up = |lane: usize| sum_of_moments(points.finite(&rect(lane)));
+        // SAFETY: as the caller's.
+        unsafe { run.note_afresh::<S>(at, lanes, sum_up) };
+        lanes
+    }
+
+    #[inline(always)]
+    unsafe fn solve<S: Groups>(run: &mut Matrices, at: usize, lanes: &[u32]) {
+        // SAFETY: as the caller's.
+        unsafe { run.solve::<S>(at, lanes) }
+    }
+
+    #[inline(always)]
+    unsafe fn estimate<S: Simd>(run: &Matrices, at: usize, error: f64) -> Found<S> {
+        // SAFETY: as the caller's.
+        unsafe { run.normals(at, error) }
     }
 }
 
@@ -165,6 +214,8 @@ impl Channels<8> for Gradients {
 }
 
 impl Sums<8> for Gradients {
+    type OfRun = Tangents;
+
     const CURVATURE: bool = false;
     const INNER: bool = true;
     const ENDS: bool = false;
@@ -174,19 +225,25 @@ impl Sums<8> for Gradients {
     }
 
     #[inline(always)]
-    unsafe fn normals<S: Groups>(
+    unsafe fn note<S: Groups>(
         sums: &[Doubles<S>; 8],
         _: &Rects,
         _: &[Counted],
-        error: f64,
         _: u32,
-        _: u32,
-    ) -> Found<S> {
+        run: &mut Tangents,
+        at: usize,
+    ) {
         let [hx, hy, hz, _, vx, vy, vz, _] = *sums;
         let horizontal = [hx.narrow(), hy.narrow(), hz.narrow()];
         let vertical = [vx.narrow(), vy.narrow(), vz.narrow()];
         // SAFETY: as the caller's.
-        unsafe { across(horizontal, vertical, error) }
+        unsafe { run.note(horizontal, vertical, at) }
+    }
+
+    #[inline(always)]
+    unsafe fn estimate<S: Simd>(run: &Tangents, at: usize, error: f64) -> Found<S> {
+        // SAFETY: as the caller's.
+        unsafe { run.across(at, error) }
     }
 }
 
@@ -204,6 +261,8 @@ impl Channels<4> for SmoothedDepthChanges {
 }
 
 impl Sums<4> for SmoothedDepthChanges {
+    type OfRun = Tangents;
+
     const CURVATURE: bool = false;
     const INNER: bool = true;
     const ENDS: bool = true;
@@ -213,14 +272,14 @@ impl Sums<4> for SmoothedDepthChanges {
     }
 
     #[inline(always)]
-    unsafe fn normals<S: Groups>(
+    unsafe fn note<S: Groups>(
         sums: &[Doubles<S>; 4],
         rects: &Rects,
         points: &[Counted],
-        error: f64,
         lanes: u32,
-        _: u32,
-    ) -> Found<S> {
+        run: &mut Tangents,
+        at: usize,
+    ) {
         let [h, h_count, v, v_count] = *sums;
         // SAFETY: as the caller's.
         unsafe {
@@ -229,12 +288,16 @@ impl Sums<4> for SmoothedDepthChanges {
             // Times twice the number of depth changes, which are over two pixels each.
             let (h_count, v_count) = (h_count.narrow(), v_count.narrow());
             let (h_count, v_count) = (h_count + h_count, v_count + v_count);
-            across(
-                [hx * h_count, hy * h_count, h.narrow() * h_span],
-                [vx * v_count, vy * v_count, v.narrow() * v_span],
-                error,
-            )
+            let horizontal = [hx * h_count, hy * h_count, h.narrow() * h_span];
+            let vertical = [vx * v_count, vy * v_count, v.narrow() * v_span];
+            run.note(horizontal, vertical, at);
         }
+    }
+
+    #[inline(always)]
+    unsafe fn estimate<S: Simd>(run: &Tangents, at: usize, error: f64) -> Found<S> {
+        // SAFETY: as the caller's.
+        unsafe { run.across(at, error) }
     }
 }
 
@@ -284,24 +347,44 @@ const DOUBT_SINE: f32 = 1e-4;
 /// And where their squares come near the smallest floats.
 const DOUBT_TINY: f32 = 1e-30;
 
-/// The directions across horizontal and vertical tangents.
-///
-/// # Safety
-/// The processor has the instruction set of `S`.
-#[inline(always)]
-unsafe fn across<S: Groups>(h: [Floats<S>; 3], v: [Floats<S>; 3], error: f64) -> Found<S> {
-    // SAFETY: as the caller's.
-    unsafe {
-        let n = cross(v, h);
-        let (n2, h2, v2) = (dot(n, n), dot(h, h), dot(v, v));
-        let error = (error * DOUBT_SUMS) as f32;
-        let rounding = Floats::splat(2.0 * error * error) * (h2 + v2);
-        let sine = h2 * v2 * Floats::splat(DOUBT_SINE);
-        let scale = Floats::splat(1.0) / n2.sqrt();
-        Found {
-            normal: [n[0] * scale, n[1] * scale, n[2] * scale],
-            curvature: Floats::splat(f32::NAN),
-            doubtful: !rounding.max(sine).max(Floats::splat(DOUBT_TINY)).lt(n2),
+/// Horizontal and vertical tangents of a run's pixels.
+#[derive(Default)]
+pub(crate) struct Tangents([OfRun<f32, 3>; 2]);
+
+impl Tangents {
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn note<S: Simd>(&mut self, h: [Floats<S>; 3], v: [Floats<S>; 3], at: usize) {
+        let Tangents([horizontal, vertical]) = self;
+        // SAFETY: as the caller's.
+        unsafe {
+            horizontal.store::<S>(at, h);
+            vertical.store::<S>(at, v);
+        }
+    }
+
+    /// The directions across them. `error` is what those of the sums stay below.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn across<S: Simd>(&self, at: usize, error: f64) -> Found<S> {
+        let Tangents([horizontal, vertical]) = self;
+        // SAFETY: as the caller's.
+        unsafe {
+            let (h, v) = (horizontal.load::<S>(at), vertical.load::<S>(at));
+            let n = cross(v, h);
+            let (n2, h2, v2) = (dot(n, n), dot(h, h), dot(v, v));
+            let error = (error * DOUBT_SUMS) as f32;
+            let rounding = Floats::splat(2.0 * error * error) * (h2 + v2);
+            let sine = h2 * v2 * Floats::splat(DOUBT_SINE);
+            let scale = Floats::splat(1.0) / n2.sqrt();
+            Found {
+                normal: [n[0] * scale, n[1] * scale, n[2] * scale],
+                curvature: Floats::splat(f32::NAN),
+                doubtful: !rounding.max(sine).max(Floats::splat(DOUBT_TINY)).lt(n2),
+            }
         }
     }
 }

@@ -7,6 +7,8 @@ use super::integrals::{Rings, reached, rows_of_rings};
 use super::methods::{Sums, gather};
 use super::rects::{Place, Rects};
 use crate::cloud::Points;
+use crate::fast::lanes::LANES;
+use crate::fast::run::{OfRun, RUN};
 use crate::fast::sink::Sink;
 use crate::fast::tile::{Bits, Estimates};
 use crate::methods::Estimate;
@@ -48,6 +50,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let Range { start: top, end: bottom } = reached(&self.rows, reach, height);
         let count = columns.len() * (bottom - top);
         rings.start(columns, top, rows_of_rings(reach, height));
+        let mut run = Run::default();
         // SAFETY: as the caller's.
         unsafe { rings.read::<S>(self.points, (self.row)(top).0, top, self.whole_points) };
         let mut next = top;
@@ -65,7 +68,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
             }
             let error = M::error(rings.total(next - 1), count, rings.largest);
             // SAFETY: as the caller's.
-            unsafe { self.row::<S, M, N>(rings, sink, y, error) };
+            unsafe { self.row::<S, M, N>(rings, sink, &mut run, y, error) };
         }
     }
 
@@ -87,6 +90,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         &self,
         rings: &Rings<N>,
         sink: &Sink,
+        run: &mut Run<M::OfRun>,
         y: usize,
         error: f64,
     ) {
@@ -99,48 +103,83 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         for (lane, to) in steps.iter_mut().enumerate() {
             *to = (lane * step) as i32;
         }
+        for start in self.columns.clone().step_by(RUN * step) {
+            run.start = start;
+            run.lanes = [0; RUN / LANES];
+            let end = self.columns.end.min(start + RUN * step);
+            for (group, x) in (start..end).step_by(GROUP * step).enumerate() {
+                let at = group * GROUP;
+                let count = (end - x).div_ceil(step).min(GROUP);
+                let place = Place { image, x, y, step, left, stride, rows };
+                // SAFETY: as the caller's; the rings hold what the windows of the tile's pixels need.
+                unsafe {
+                    let eight = S::load(radii[x / step..].as_ptr());
+                    let windows = S::bits(S::lt(S::splat(0.0), eight)) & ((1 << count) - 1);
+                    if windows == 0 {
+                        continue;
+                    }
+                    run.lanes[at / LANES] |= windows << (at % LANES);
+                    // Behind the last column radii mean nothing.
+                    let eight = S::and(S::mask(windows), eight);
+                    let rects = Rects::new::<S, N>(&place, eight, M::INNER, M::ENDS);
+                    let sums = rects.sums::<S, N>(sums);
+                    M::note::<S>(&sums, &rects, points, windows, &mut run.sums, at);
+                    let [px, py, pz, _] = gather::<S>(rings.points_from(x, y), &steps);
+                    run.points.store::<S>(at, [px, py, pz]);
+                }
+            }
+            // SAFETY: as the caller's.
+            unsafe { self.finish::<S, M, N>(sink, run, y, error) };
+        }
+    }
+
+    /// Writes the normals of a run in row `y`.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn finish<S: Groups, M: Sums<N>, const N: usize>(
+        &self,
+        sink: &Sink,
+        run: &mut Run<M::OfRun>,
+        y: usize,
+        error: f64,
+    ) {
+        let step = self.step;
+        let radii = (self.row)(y).1;
+        let (width, height) = (self.points.width(), self.points.height());
         let cleaned =
             Cleaned { points: self.points, zero_is_missing: self.options.zero_is_missing };
-        for x in self.columns.clone().step_by(GROUP * step) {
-            let count = (self.columns.end - x).div_ceil(step).min(GROUP);
-            let place = Place { image, x, y, step, left, stride, rows };
-            let radii = &radii[x / step..];
-            let pixel = |lane: usize| (x + lane * step, y);
-            let rect = |lane: usize| window(pixel(lane), radii[lane] as usize, image[0], image[1]);
-            // SAFETY: as the caller's; the rings hold what the windows of the tile's pixels need.
-            unsafe {
-                let eight = S::load(radii.as_ptr());
-                let windows = S::bits(S::lt(S::splat(0.0), eight)) & ((1 << count) - 1);
+        let Run { start, sums, points, lanes } = run;
+        let end = self.columns.end.min(*start + RUN * step);
+        // SAFETY: as the caller's.
+        unsafe {
+            M::solve::<S>(sums, 0, lanes);
+            for (pair, x) in (*start..end).step_by(LANES * step).enumerate() {
+                let (at, windows) = (pair * LANES, lanes[pair]);
+                let count = (end - x).div_ceil(step).min(LANES);
                 if windows == 0 {
                     sink.write_none(x / step, y / step, count);
                     continue;
                 }
-                // Behind the last column radii mean nothing.
-                let eight = S::and(S::mask(windows), eight);
-                let rects = Rects::new::<S, N>(&place, eight, M::INNER, M::ENDS);
-                let mut sums = rects.sums::<S, N>(sums);
-                let mut fresh = 0;
-                let found = loop {
-                    let found = M::normals(&sums, &rects, points, error, windows, fresh);
-                    let mut tried = 0;
-                    for lane in Bits(found.doubtful & windows & !fresh) {
-                        if let Some(one) = M::afresh(&cleaned, &rect(lane)) {
-                            for (sum, one) in sums.iter_mut().zip(one) {
-                                sum.0 = S::select_bits_d(1 << lane, S::splat_d(one), sum.0);
-                            }
-                            tried |= 1 << lane;
-                        }
-                    }
-                    if tried == 0 {
-                        break found;
-                    }
-                    fresh |= tried;
+                let pixel = |lane: usize| (x + lane * step, y);
+                let rect = |lane: usize| {
+                    window(pixel(lane), radii[x / step + lane] as usize, width, height)
                 };
-                let plain = found.doubtful & windows;
-                let [px, py, pz, _] = gather::<S>(rings.points_from(x, y), &steps);
+                let mut found = M::estimate::<S::Pair>(sums, at, error);
+                let mut plain = found.doubtful & windows;
+                if plain != 0 {
+                    let fresh = M::afresh::<S>(&cleaned, rect, plain, sums, at);
+                    if fresh != 0 {
+                        M::solve::<S>(sums, at, &[fresh]);
+                        let again = M::estimate::<S::Pair>(sums, at, 0.0);
+                        found.take(fresh, &again);
+                        plain &= !fresh | again.doubtful;
+                    }
+                }
                 let viewpoint = self.options.viewpoint;
-                let (sure, here) = (windows & !plain, [px, py, pz]);
-                let mut normals = Estimates::<GROUP>::of(found, here, viewpoint, sure);
+                let (sure, here) = (windows & !plain, points.load::<S::Pair>(at));
+                let mut normals = Estimates::<LANES>::of(found, here, viewpoint, sure);
                 for lane in Bits(plain) {
                     normals.put(lane, self.plain(&cleaned, pixel(lane), &rect(lane)));
                 }
@@ -156,4 +195,15 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let normal = turn_to_viewpoint(found.normal, points.at(x, y), self.options.viewpoint);
         Estimate { normal, ..found }
     }
+}
+
+/// Pixels of a row whose normals are found step by step, each step for all of them.
+#[derive(Default)]
+struct Run<T> {
+    /// The first one's column.
+    start: usize,
+    sums: T,
+    points: OfRun<f32, 3>,
+    /// The lanes of each pair of groups that have a window.
+    lanes: [u32; RUN / LANES],
 }
