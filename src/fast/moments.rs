@@ -126,14 +126,11 @@ impl Sums for Moments {
                     S::store_d(centered.add(c * stride + at), (coordinate - origin).0);
                 }
             }
-            let coordinate = |c: usize| centered.wrapping_add(c * stride).cast_const();
-            for c in 0..3 {
-                integrate::<S, 1>([coordinate(c)], above, row, c * stride, groups);
-            }
-            let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
-            for (c, (a, b)) in (3..).zip(pairs) {
-                integrate::<S, 2>([coordinate(a), coordinate(b)], above, row, c * stride, groups);
-            }
+            let [x, y, z] = [0, 1, 2].map(|c| centered.wrapping_add(c * stride).cast_const());
+            let planes = |first: usize| [0, 1, 2].map(|c| (first + c) * stride);
+            integrate::<S, 1>([[x], [y], [z]], above, row, planes(0), groups);
+            integrate::<S, 2>([[x, x], [x, y], [x, z]], above, row, planes(3), groups);
+            integrate::<S, 2>([[y, y], [y, z], [z, z]], above, row, planes(6), groups);
         }
         self.pushed = place;
         let end = frame.start_of(CHANNELS, place) + MARGIN + groups * GROUP - 1;
@@ -468,30 +465,36 @@ unsafe fn least_root<S: Simd>([c0, c1, c2]: [Floats<S>; 3]) -> Floats<S> {
     }
 }
 
-/// One plane of an integral row (Eq. 2) of the products of `FACTORS` rows.
+/// Three planes of an integral row (Eq. 2) of the products of `FACTORS` rows each: sums along three rows at a time,
+/// as each addition waits for the one before.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`; the groups are inside the rows, and in the planes after the margin.
 #[inline(always)]
 unsafe fn integrate<S: Groups, const FACTORS: usize>(
-    factors: [*const f64; FACTORS],
+    factors: [[*const f64; FACTORS]; 3],
     above: *const f64,
     row: *mut f64,
-    plane: usize,
+    planes: [usize; 3],
     groups: usize,
 ) {
     // SAFETY: as the caller's.
     unsafe {
-        row.add(plane + MARGIN - 1).write(0.0);
-        let mut carry = S::splat_d(0.0);
+        for plane in planes {
+            row.add(plane + MARGIN - 1).write(0.0);
+        }
+        let mut carries = [S::splat_d(0.0); 3];
         for group in 0..groups {
             let at = MARGIN + group * GROUP;
-            let mut product = S::load_d(factors[0].add(at));
-            if FACTORS == 2 {
-                product = S::mul_d(product, S::load_d(factors[1].add(at)));
+            for c in 0..3 {
+                let mut product = S::load_d(factors[c][0].add(at));
+                if FACTORS == 2 {
+                    product = S::mul_d(product, S::load_d(factors[c][1].add(at)));
+                }
+                let along = S::running_sum_d(product, &mut carries[c]);
+                let sum = S::add_d(along, S::load_d(above.add(planes[c] + at)));
+                S::store_d(row.add(planes[c] + at), sum);
             }
-            let along = S::running_sum_d(product, &mut carry);
-            S::store_d(row.add(plane + at), S::add_d(along, S::load_d(above.add(plane + at))));
         }
     }
 }
