@@ -289,7 +289,8 @@ pub(crate) struct Matrices {
     trace: OfRun<f32, 1>,
     /// c0, c1 and c2 of the characteristic polynomial, value^3 - c2 value^2 + c1 value - c0.
     polynomial: OfRun<f64, 3>,
-    /// Its least root, its slope there, and the lanes of pairs of groups that are not sure of them.
+    /// What is near its least root; that, the slope there, and the lanes of pairs of groups that are not sure of them.
+    near: OfRun<f32, 1>,
     value: OfRun<f64, 1>,
     slope: OfRun<f32, 1>,
     unsettled: [u32; RUN / LANES],
@@ -364,22 +365,32 @@ impl Matrices {
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     pub unsafe fn solve<S: Groups>(&mut self, at: usize, lanes: &[u32]) {
-        for (at, lanes) in (at..).step_by(LANES).zip(lanes).filter(|(_, lanes)| **lanes != 0) {
+        let pairs = || (at..).step_by(LANES).zip(lanes).filter(|(_, lanes)| **lanes != 0);
+        for (at, _) in pairs() {
             // SAFETY: as the caller's.
-            self.unsettled[at / LANES] = unsafe { self.least_roots::<S::Pair>(at, *lanes) };
+            unsafe {
+                let [c0, c1, c2] = self.polynomial.load::<S::Pair>(at);
+                let near = least_root([c0.narrow(), c1.narrow(), c2.narrow()]);
+                self.near.store::<S::Pair>(at, [near]);
+            }
+        }
+        for (at, lanes) in pairs() {
+            // SAFETY: as the caller's.
+            self.unsettled[at / LANES] = unsafe { self.newton_steps::<S::Pair>(at, *lanes) };
         }
     }
 
-    /// Returns the lanes whose steps have not ended.
+    /// From what is near the least roots to these; returns the lanes whose steps have not ended.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn least_roots<S: Simd>(&mut self, at: usize, lanes: u32) -> u32 {
+    unsafe fn newton_steps<S: Simd>(&mut self, at: usize, lanes: u32) -> u32 {
         // SAFETY: as the caller's.
         unsafe {
             let [c0, c1, c2] = self.polynomial.load::<S>(at);
-            let mut value = least_root([c0.narrow(), c1.narrow(), c2.narrow()]).widen();
+            let [near] = self.near.load::<S>(at);
+            let mut value = near.widen();
             let twice = c2 + c2;
             let (three, converged) = (Doubles::splat(3.0), Floats::splat(CONVERGED));
             let (mut slope, mut unsettled) = (Floats::splat(0.0), lanes);
