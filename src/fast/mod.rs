@@ -1,8 +1,8 @@
 //! The fast form of the whole method: the same steps as the plain form, over lanes, rows and tiles.
 //!
 //! First the windows of the whole image (`windows`), then tile by tile the points (`planes`), the method's rings of
-//! sums (`strips`, `moments`, `half_windows`) and the normals (`tile`). Tiles are fixed by the frame and the options,
-//! so that results do not depend on the number of threads.
+//! sums (`strips`, `moments`, `half_windows`) and, run by run (`run`), the normals (`tile`). Tiles are fixed by the
+//! frame and the options, so that results do not depend on the number of threads.
 
 mod arithmetic;
 mod buffer;
