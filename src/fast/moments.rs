@@ -5,7 +5,7 @@ use super::arithmetic::{Doubles, Floats, dot};
 use super::buffer::Buffer;
 use super::lanes::LANES;
 use super::planes::{Corners, Frame, MARGIN, Planes, sum_between};
-use super::run::{OfRun, RUN};
+use super::run::{Noted, OfRun, RUN};
 use super::tile::{Bits, Found, Sums};
 use crate::cloud::Points;
 use crate::paper::{ROUNDING, refill};
@@ -263,12 +263,6 @@ impl Sums for Moments {
     }
 
     #[inline(always)]
-    unsafe fn solve<S: Groups>(run: &mut Matrices, at: usize, lanes: &[u32]) {
-        // SAFETY: as the caller's.
-        unsafe { run.solve::<S>(at, lanes) }
-    }
-
-    #[inline(always)]
     unsafe fn estimate<S: Simd>(
         &self,
         run: &Matrices,
@@ -294,6 +288,26 @@ pub(crate) struct Matrices {
     value: OfRun<f64, 1>,
     slope: OfRun<f32, 1>,
     unsettled: [u32; RUN / LANES],
+}
+
+impl Noted for Matrices {
+    /// The smallest eigenvalues: the least roots in closed form, made precise by Newton steps.
+    #[inline(always)]
+    unsafe fn solve<S: Groups>(&mut self, at: usize, lanes: &[u32]) {
+        let pairs = || (at..).step_by(LANES).zip(lanes).filter(|(_, lanes)| **lanes != 0);
+        for (at, _) in pairs() {
+            // SAFETY: as the caller's.
+            unsafe {
+                let [c0, c1, c2] = self.polynomial.load::<S::Pair>(at);
+                let near = least_root([c0.narrow(), c1.narrow(), c2.narrow()]);
+                self.near.store::<S::Pair>(at, [near]);
+            }
+        }
+        for (at, lanes) in pairs() {
+            // SAFETY: as the caller's.
+            self.unsettled[at / LANES] = unsafe { self.newton_steps::<S::Pair>(at, *lanes) };
+        }
+    }
 }
 
 impl Matrices {
@@ -355,28 +369,6 @@ impl Matrices {
                 }
                 self.note::<S>(&WindowMoments { sums: of8, share }, at + group);
             }
-        }
-    }
-
-    /// The smallest eigenvalues of the matrices from `at` on in the run, for `lanes` of each pair of groups: the least
-    /// roots in closed form, made precise by Newton steps.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    pub unsafe fn solve<S: Groups>(&mut self, at: usize, lanes: &[u32]) {
-        let pairs = || (at..).step_by(LANES).zip(lanes).filter(|(_, lanes)| **lanes != 0);
-        for (at, _) in pairs() {
-            // SAFETY: as the caller's.
-            unsafe {
-                let [c0, c1, c2] = self.polynomial.load::<S::Pair>(at);
-                let near = least_root([c0.narrow(), c1.narrow(), c2.narrow()]);
-                self.near.store::<S::Pair>(at, [near]);
-            }
-        }
-        for (at, lanes) in pairs() {
-            // SAFETY: as the caller's.
-            self.unsettled[at / LANES] = unsafe { self.newton_steps::<S::Pair>(at, *lanes) };
         }
     }
 

@@ -5,7 +5,7 @@
 
 use super::arithmetic::{Doubles, Floats};
 use super::lanes::LANES;
-use crate::simd::Simd;
+use crate::simd::{Groups, Simd};
 
 /// Pixels in a run at most: more than a processor works at, and little enough for its first-level cache.
 pub(crate) const RUN: usize = 4 * LANES;
@@ -14,51 +14,114 @@ pub(crate) const RUN: usize = 4 * LANES;
 #[repr(C, align(64))]
 pub(crate) struct OfRun<T, const N: usize>([[T; RUN]; N]);
 
-impl<T: Copy + Default, const N: usize> Default for OfRun<T, N> {
+impl<T: Lane, const N: usize> Default for OfRun<T, N> {
     fn default() -> Self {
         OfRun([[T::default(); RUN]; N])
     }
 }
 
-macro_rules! numbers {
-    ($($type:ident, $lanes:ty, $value:ident => $inner:expr, $from:ident => $wrap:expr, $splat:expr, $load:ident, $store:ident;)*) => {
-        $(impl<const N: usize> OfRun<$type, N> {
-            /// Those of the pixels from `at` on.
-            ///
-            /// # Safety
-            /// The processor has the instruction set of `S`.
-            #[inline(always)]
-            pub unsafe fn load<S: Simd>(&self, at: usize) -> [$lanes; N] {
-                assert!(at + S::LANES <= RUN);
-                // SAFETY: as the caller's; the pixels are in the run, as was just checked.
-                unsafe {
-                    let mut values = [$splat; N];
-                    for c in 0..N {
-                        let $from = S::$load(self.0[c].as_ptr().add(at));
-                        values[c] = $wrap;
-                    }
-                    values
-                }
-            }
+/// Numbers that lanes hold.
+pub(crate) trait Lane: Copy + Default {
+    /// As many as there are lanes.
+    type Of<S: Simd>: Copy;
 
-            /// As [`OfRun::load`].
-            #[inline(always)]
-            pub unsafe fn store<S: Simd>(&mut self, at: usize, values: [$lanes; N]) {
-                assert!(at + S::LANES <= RUN);
-                // SAFETY: as the caller's; the pixels are in the run, as was just checked.
-                unsafe {
-                    for c in 0..N {
-                        let $value = values[c];
-                        S::$store(self.0[c].as_mut_ptr().add(at), $inner);
-                    }
-                }
-            }
-        })*
-    };
+    /// # Safety
+    /// The processor has the instruction set of `S`; there are so many numbers.
+    unsafe fn load<S: Simd>(from: *const Self) -> Self::Of<S>;
+
+    /// # Safety
+    /// As [`Lane::load`].
+    unsafe fn store<S: Simd>(to: *mut Self, value: Self::Of<S>);
 }
 
-numbers! {
-    f32, Floats<S>, value => value.0, lanes => Floats(lanes), Floats::splat(0.0), load, store;
-    f64, Doubles<S>, value => value.0, lanes => Doubles(lanes), Doubles::splat(0.0), load_d, store_d;
-    i32, S::I, value => value, lanes => lanes, S::splat_i(0), load_i, store_i;
+impl Lane for f32 {
+    type Of<S: Simd> = Floats<S>;
+
+    #[inline(always)]
+    unsafe fn load<S: Simd>(from: *const f32) -> Floats<S> {
+        // SAFETY: as the caller's.
+        unsafe { Floats::load(from) }
+    }
+
+    #[inline(always)]
+    unsafe fn store<S: Simd>(to: *mut f32, value: Floats<S>) {
+        // SAFETY: as the caller's.
+        unsafe { S::store(to, value.0) };
+    }
 }
+
+impl Lane for f64 {
+    type Of<S: Simd> = Doubles<S>;
+
+    #[inline(always)]
+    unsafe fn load<S: Simd>(from: *const f64) -> Doubles<S> {
+        // SAFETY: as the caller's.
+        Doubles(unsafe { S::load_d(from) })
+    }
+
+    #[inline(always)]
+    unsafe fn store<S: Simd>(to: *mut f64, value: Doubles<S>) {
+        // SAFETY: as the caller's.
+        unsafe { S::store_d(to, value.0) };
+    }
+}
+
+impl Lane for i32 {
+    type Of<S: Simd> = S::I;
+
+    #[inline(always)]
+    unsafe fn load<S: Simd>(from: *const i32) -> S::I {
+        // SAFETY: as the caller's.
+        unsafe { S::load_i(from) }
+    }
+
+    #[inline(always)]
+    unsafe fn store<S: Simd>(to: *mut i32, value: S::I) {
+        // SAFETY: as the caller's.
+        unsafe { S::store_i(to, value) };
+    }
+}
+
+impl<T: Lane, const N: usize> OfRun<T, N> {
+    /// Those of the pixels from `at` on.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn load<S: Simd>(&self, at: usize) -> [T::Of<S>; N] {
+        assert!(at + S::LANES <= RUN);
+        // SAFETY: as the caller's; the pixels are in the run, as was just checked.
+        unsafe {
+            let mut values = [T::load::<S>(self.0[0].as_ptr().add(at)); N];
+            for c in 1..N {
+                values[c] = T::load::<S>(self.0[c].as_ptr().add(at));
+            }
+            values
+        }
+    }
+
+    /// As [`OfRun::load`].
+    #[inline(always)]
+    pub unsafe fn store<S: Simd>(&mut self, at: usize, values: [T::Of<S>; N]) {
+        assert!(at + S::LANES <= RUN);
+        // SAFETY: as the caller's; the pixels are in the run, as was just checked.
+        unsafe {
+            for c in 0..N {
+                T::store::<S>(self.0[c].as_mut_ptr().add(at), values[c]);
+            }
+        }
+    }
+}
+
+/// What a method notes of a run's windows.
+pub(crate) trait Noted: Default {
+    /// Goes as far with normals as has no other use of their windows: those of the pairs of groups from `at` on, with
+    /// `lanes` of each that have been noted; the others hold anything.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn solve<S: Groups>(&mut self, _at: usize, _lanes: &[u32]) {}
+}
+
+impl<T: Lane, const N: usize> Noted for OfRun<T, N> {}

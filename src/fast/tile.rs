@@ -6,7 +6,7 @@ use std::ops::{Range, RangeInclusive};
 use super::arithmetic::{Floats, dot};
 use super::lanes::LANES;
 use super::planes::{Frame, MARGIN, Planes};
-use super::run::RUN;
+use super::run::{Noted, RUN};
 use super::sink::Sink;
 use crate::cloud::Points;
 use crate::methods::{Estimate, estimate};
@@ -45,7 +45,7 @@ pub(crate) trait Sums {
     /// The sums of one window.
     type Of1;
     /// What the normals of a run of pixels are made from.
-    type OfRun: Default;
+    type OfRun: Noted;
 
     /// Bytes a column of a ring's row takes.
     const COLUMN: usize;
@@ -140,13 +140,6 @@ pub(crate) trait Sums {
     /// # Safety
     /// As [`Sums::push`].
     unsafe fn note<S: Simd>(sums: Self::OfLanes<S>, run: &mut Self::OfRun, at: usize);
-
-    /// Goes as far with normals as has no other use of their windows: those of the pairs of groups from `at` on in a
-    /// run, with `lanes` of each that have been noted: the others hold anything.
-    ///
-    /// # Safety
-    /// As [`Sums::push`].
-    unsafe fn solve<S: Groups>(_run: &mut Self::OfRun, _at: usize, _lanes: &[u32]) {}
 
     /// The estimates of the pixels from `at` on in a run, which are solved; `sides` are those of their windows. Whether
     /// their sums are from [`Sums::afresh`], `fresh` tells.
@@ -345,7 +338,7 @@ impl Tile<'_> {
         let Run { sums: of_run, places, lanes, length } = run;
         // SAFETY: as the caller's; the rows are readable up to a whole pair of groups.
         unsafe {
-            M::solve::<S>(of_run, 0, &lanes[..*length]);
+            of_run.solve::<S>(0, &lanes[..*length]);
             for number in 0..*length {
                 let (x, windows) = places[number];
                 let at = number * LANES;
@@ -358,7 +351,7 @@ impl Tile<'_> {
                     let (points, image) = (self.points, self.image);
                     let tried = M::afresh::<S>(points, image, window, doubtful, of_run, at);
                     if tried != 0 {
-                        M::solve::<S>(of_run, at, &[tried]);
+                        of_run.solve::<S>(at, &[tried]);
                         let fresh = sums.estimate::<S::Pair>(of_run, at, sides, true);
                         found.take(tried, &fresh);
                         plain &= !tried | fresh.doubtful;

@@ -5,7 +5,7 @@ use super::integrals::{Channels, Counted};
 use super::rects::Rects;
 use crate::fast::arithmetic::{Doubles, Floats, cross, dot};
 use crate::fast::moments::{Matrices, WindowMoments, sum_of_moments};
-use crate::fast::run::OfRun;
+use crate::fast::run::{Noted, OfRun};
 use crate::fast::tile::{Bits, Found};
 use crate::paper::{CleanPoints, ROUNDING, Rect};
 use crate::simd::{GROUP, Groups, Simd};
@@ -13,7 +13,7 @@ use crate::simd::{GROUP, Groups, Simd};
 /// A method's sums and normals.
 pub(crate) trait Sums<const N: usize>: Channels<N> {
     /// What the normals of a run of pixels are made from.
-    type OfRun: Default;
+    type OfRun: Noted;
 
     /// Whether the method gives a curvature.
     const CURVATURE: bool;
@@ -56,13 +56,6 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
     ) -> u32 {
         0
     }
-
-    /// Goes as far with normals as has no other use of their windows: those of the pairs of groups from `at` on in a
-    /// run, with `lanes` of each that have been noted.
-    ///
-    /// # Safety
-    /// As [`Sums::note`].
-    unsafe fn solve<S: Groups>(_run: &mut Self::OfRun, _at: usize, _lanes: &[u32]) {}
 
     /// The normals of the pixels from `at` on in a run, which are solved.
     ///
@@ -147,12 +140,6 @@ impl Sums<MOMENTS> for CovarianceMatrix {
         // SAFETY: as the caller's.
         unsafe { run.note_afresh::<S>(at, lanes, sum_up) };
         lanes
-    }
-
-    #[inline(always)]
-    unsafe fn solve<S: Groups>(run: &mut Matrices, at: usize, lanes: &[u32]) {
-        // SAFETY: as the caller's.
-        unsafe { run.solve::<S>(at, lanes) }
     }
 
     #[inline(always)]
@@ -350,6 +337,8 @@ const DOUBT_TINY: f32 = 1e-30;
 /// Horizontal and vertical tangents of a run's pixels.
 #[derive(Default)]
 pub(crate) struct Tangents([OfRun<f32, 3>; 2]);
+
+impl Noted for Tangents {}
 
 impl Tangents {
     /// # Safety

@@ -8,7 +8,7 @@ use super::methods::{Sums, gather};
 use super::rects::{Place, Rects};
 use crate::cloud::Points;
 use crate::fast::lanes::LANES;
-use crate::fast::run::{OfRun, RUN};
+use crate::fast::run::{Noted, OfRun, RUN};
 use crate::fast::sink::Sink;
 use crate::fast::tile::{Bits, Estimates};
 use crate::methods::Estimate;
@@ -154,7 +154,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let end = self.columns.end.min(*start + RUN * step);
         // SAFETY: as the caller's.
         unsafe {
-            M::solve::<S>(sums, 0, lanes);
+            sums.solve::<S>(0, lanes);
             for (pair, x) in (*start..end).step_by(LANES * step).enumerate() {
                 let (at, windows) = (pair * LANES, lanes[pair]);
                 let count = (end - x).div_ceil(step).min(LANES);
@@ -171,7 +171,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 if plain != 0 {
                     let fresh = M::afresh::<S>(&cleaned, rect, plain, sums, at);
                     if fresh != 0 {
-                        M::solve::<S>(sums, at, &[fresh]);
+                        sums.solve::<S>(at, &[fresh]);
                         let again = M::estimate::<S::Pair>(sums, at, 0.0);
                         found.take(fresh, &again);
                         plain &= !fresh | again.doubtful;
