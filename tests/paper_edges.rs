@@ -140,6 +140,31 @@ fn the_second_pass_leaves_smooth_surfaces_as_they_are() {
 }
 
 #[test]
+fn exact_depths_have_exact_normals_up_to_the_edges() {
+    for (name, y) in [("box", 160.0), ("room", 120.0)] {
+        let (frame, distances) = frame(name, [160.0, y], Noise::None);
+        for method in [Method::CovarianceMatrix, Method::Average3DGradient] {
+            for side in [3, 5] {
+                let mut options = options(method, true, true);
+                options.paper.alpha = 1e-4;
+                options.paper.gamma = 140.0;
+                options.paper.smallest_radius = 1;
+                options.paper.least_depth_radius = side / 2;
+                options.paper.largest_radius = side / 2;
+                let normals = normals(&frame.points, frame.width(), options);
+                let bounds = [(Band::Crease, 0.2), (Band::DepthEdge, 0.3), (Band::Elsewhere, 0.01)];
+                for (band, bound) in bounds {
+                    let Score { mean, coverage } = score(&frame, &distances, &normals, band);
+                    println!("{name} {method:?} {side} {band:?}: {mean:.4} deg, {coverage}");
+                    assert!(coverage == 1.0, "{name} {method:?} {side} {band:?}: {coverage}");
+                    assert!(mean <= bound, "{name} {method:?} {side} {band:?}: {mean}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn almost_every_point_of_a_real_frame_has_a_normal() {
     for name in REAL_FRAMES {
         let test = "almost_every_point_of_a_real_frame_has_a_normal";

@@ -42,7 +42,22 @@ impl Mode {
         Mode { name, options }
     }
 
-    /// Every method of either semantics, plain and with the extras.
+    /// A mode for depths without noise, with both extras: the paper's windows, `side` pixels wide everywhere.
+    pub fn of_exact_depths(method: Method, side: u32) -> Self {
+        let mut mode = Mode::new(Semantics::Paper, method, true, true);
+        mode.name = format!("{}-{side}+o+c", method_name(method, Semantics::Paper));
+        let paper = &mut mode.options.paper;
+        // Depth changes are where they are by default.
+        let threshold = paper.gamma * paper.alpha;
+        paper.alpha = 1e-4;
+        paper.gamma = threshold / paper.alpha;
+        paper.smallest_radius = 1;
+        paper.least_depth_radius = side / 2;
+        paper.largest_radius = side / 2;
+        mode
+    }
+
+    /// Every method of either semantics, plain and with the extras; and the paper's for depths without noise.
     pub fn all() -> Vec<Mode> {
         let mut modes = Vec::new();
         for semantics in Semantics::ALL {
@@ -56,6 +71,11 @@ impl Mode {
                     }
                 }
             }
+        }
+        for method in
+            [Method::CovarianceMatrix, Method::Average3DGradient, Method::AverageDepthChange]
+        {
+            modes.extend([3, 5].map(|side| Mode::of_exact_depths(method, side)));
         }
         modes
     }

@@ -32,6 +32,8 @@ pub(crate) const NEAR_NOISE: f32 = 4.0;
 pub(crate) const JAGGED: f64 = 1.4;
 pub(crate) const JAGGED_RADIUS: u32 = 2;
 pub(crate) const JAGGED_POINTS: f64 = 0.8;
+/// Depths are exact if more than this share of the windows that a pixel can take says so.
+pub(crate) const EXACT_SHARE: f32 = 0.25;
 /// How many pixels beyond its window's edge a plane may be taken for a pixel's: outlines are ragged.
 pub(crate) const REACH: f32 = 3.0;
 
@@ -180,6 +182,13 @@ impl EvenWindow {
         let per_bend = 1.0 / (side * side);
         EvenWindow { radius, per_noise: 12.0 / points * per_bend, per_bend, ..Self::default() }
     }
+
+    /// Whether its depths are without noise. Those that a sensor rounds look so where all are alike, so only a window
+    /// in which they change tells.
+    fn is_exact(&self, least_noise: f32) -> bool {
+        let [across, down] = self.slope;
+        self.noise < least_noise && across * across + down * down > least_noise
+    }
 }
 
 /// The even windows that are needed, to choose from.
@@ -218,20 +227,21 @@ impl EvenWindows<'_> {
         let distance = |[dx, dy]: [f32; 2]| dx.abs().max(dy.abs());
         let block = blocks.block(own);
         let first = blocks.first(block);
-        let mut noise = f32::INFINITY;
+        let (mut noise, mut exact) = (f32::INFINITY, 0.0);
         let mut found = Vec::new();
         self.asked.for_each_place(block, |place| {
             let window = &self.windows[place];
             let distance = distance(way(blocks.first(place), first));
             if window.radius > 0.0 && distance <= window.radius + REACH {
                 noise = noise.min(window.noise);
+                exact += f32::from(window.is_exact(self.asked.least_noise));
                 found.push(place);
             }
         });
 
         let noise = noise.max(self.asked.least_noise);
         let pixel = (own % cloud.width, own / cloud.width);
-        let near = self.near(pixel);
+        let near = self.near(pixel, exact > EXACT_SHARE * found.len() as f32);
         let [x, y] = way(first, pixel);
         let (point, tolerance) = (inverse_depth(cloud.depths[own]), self.tolerance(own));
         let mut best: Option<(f32, usize)> = None;
@@ -265,10 +275,12 @@ impl EvenWindows<'_> {
         super::least_depth_change(depth, self.options) / (depth * depth) / 2.0
     }
 
-    /// The mean of the pixel and those next to it, but of the pixel alone if there is a depth change among them.
-    fn near(&self, (x, y): (usize, usize)) -> Near {
+    /// The mean of the pixel and those next to it, but of the pixel alone if there is a depth change among them or
+    /// depths are exact.
+    fn near(&self, (x, y): (usize, usize), is_exact: bool) -> Near {
         let cloud = self.cloud;
-        let reach = self.asked.clean[cloud.index(x, y)].min(1) as usize;
+        let is_clean = self.asked.clean[cloud.index(x, y)] > 0;
+        let reach = usize::from(is_clean && !is_exact);
         let (mut sums, mut points) = ([0.0; 3], 0.0);
         for (column, row) in Rect::around((x, y), reach, (cloud.width, cloud.height)).pixels() {
             let inverse = inverse_depth(cloud.depths[cloud.index(column, row)]);

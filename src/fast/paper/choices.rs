@@ -5,8 +5,8 @@ use super::rects::STEPS;
 use crate::fast::arithmetic::Floats;
 use crate::fast::tile::Bits;
 use crate::paper::{
-    BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, JITTER, MISFIT, NEAR, NEAR_NOISE, PLACES, REACH,
-    inverse_depth,
+    BLOCK, Blocks, Cloud, EXACT_SHARE, EvenWindow, EvenWindows, JITTER, MISFIT, NEAR, NEAR_NOISE,
+    PLACES, REACH, inverse_depth,
 };
 use crate::simd::{GROUP, Groups};
 
@@ -18,8 +18,9 @@ use crate::simd::{GROUP, Groups};
 pub(super) unsafe fn row<S: Groups>(even: &EvenWindows, row: usize, choices: &mut [Option<u32>]) {
     let neighbours = Neighbours::new(even.cloud, row);
     // SAFETY: as the caller's.
-    let noise = unsafe { Floats::<S>::splat(0.0) };
-    let mut found = Found { candidates: Vec::new(), number: 0, noise };
+    let least_noise = unsafe { Floats::<S>::splat(even.asked.least_noise) };
+    let [noise, there, exact] = [least_noise; 3];
+    let mut found = Found { candidates: Vec::new(), number: 0, least_noise, noise, there, exact };
     let across = even.asked.blocks.across;
     for first in (0..across).step_by(GROUP) {
         let group = Group { even, row, first, count: (across - first).min(GROUP) };
@@ -27,7 +28,7 @@ pub(super) unsafe fn row<S: Groups>(even: &EvenWindows, row: usize, choices: &mu
         unsafe {
             group.candidates(&mut found);
             if found.number > 0 {
-                found.weigh(even.asked.least_noise);
+                found.weigh();
                 for (y, choices) in choices.chunks_mut(even.cloud.width).enumerate() {
                     for x in 0..BLOCK {
                         group.choose(&found, &neighbours, [x, y], choices);
@@ -115,8 +116,12 @@ struct Found<S: Groups> {
     /// Only so many mean something.
     candidates: Vec<Candidates<S>>,
     number: usize,
-    /// The least among them.
+    /// The least noise that is told from none, and the least among them.
+    least_noise: Floats<S>,
     noise: Floats<S>,
+    /// How many windows there are for each block, and how many of exact depths.
+    there: Floats<S>,
+    exact: Floats<S>,
 }
 
 impl<S: Groups> Found<S> {
@@ -166,12 +171,20 @@ impl<S: Groups> Found<S> {
             to.radius = Floats(radius);
             to.at_first = Floats(inverse_depth) + across * dx + down * dy;
             to.slope = [across, down];
-            to.jitter = Floats::splat(JITTER) * (across * across + down * down).sqrt();
+            let steepness_squared = across * across + down * down;
+            to.jitter = Floats::splat(JITTER) * steepness_squared.sqrt();
             to.unevenness = Floats(unevenness);
             to.per_noise = Floats(per_noise);
             to.per_bend = Floats(per_bend);
             let less = S::min(noise, self.noise.0);
             self.noise.0 = S::select(to.may_take, less, self.noise.0);
+            let is_exact = S::and(
+                S::lt(noise, self.least_noise.0),
+                S::lt(self.least_noise.0, steepness_squared.0),
+            );
+            let one = S::and(to.may_take, S::splat(1.0));
+            self.there = self.there + Floats(one);
+            self.exact = self.exact + Floats(S::and(is_exact, one));
         }
     }
 
@@ -180,10 +193,10 @@ impl<S: Groups> Found<S> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn weigh(&mut self, least_noise: f32) {
+    unsafe fn weigh(&mut self) {
         // SAFETY: as the caller's.
         unsafe {
-            self.noise = self.noise.max(Floats::splat(least_noise));
+            self.noise = self.noise.max(self.least_noise);
             for candidates in &mut self.candidates[..self.number] {
                 let misfit = (candidates.unevenness - self.noise).max(Floats::splat(0.0));
                 let even = self.noise * candidates.per_noise
@@ -192,6 +205,16 @@ impl<S: Groups> Found<S> {
                 candidates.even = Floats(S::select(candidates.may_take, even.0, never));
             }
         }
+    }
+
+    /// The mask of the blocks whose windows say that depths are exact.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn are_exact(&self) -> S::F {
+        // SAFETY: as the caller's.
+        unsafe { S::lt((Floats::splat(EXACT_SHARE) * self.there).0, self.exact.0) }
     }
 }
 
@@ -218,6 +241,7 @@ impl Group<'_> {
         unsafe {
             let zero = Floats::<S>::splat(0.0);
             found.noise = Floats::splat(f32::INFINITY);
+            (found.there, found.exact) = (zero, zero);
             let levels = S::load(levels.as_ptr());
             let mut radii = Floats::<S>::load(radii.as_ptr());
             let mut level = 0.0;
@@ -280,7 +304,8 @@ impl Group<'_> {
         }
         // SAFETY: as the caller's.
         unsafe {
-            let near = neighbours.near::<S>(self.first, [column, row], clean);
+            let noisy = clean & !S::bits(found.are_exact());
+            let near = neighbours.near::<S>(self.first, [column, row], noisy);
             let (zero, one) = (Floats::splat(0.0), Floats::splat(1.0));
             let [column, row] = [column, row].map(|at| Floats::splat(at as f32));
             let tolerance = Floats::load(tolerances.as_ptr());
@@ -374,8 +399,8 @@ impl Neighbours {
         Neighbours { inverse_depths }
     }
 
-    /// Of the points next to those in a column and row of eight blocks from column `first` on; around pixels that are
-    /// not `clean`, of these alone.
+    /// Of the points next to those in a column and row of eight blocks from column `first` on; around pixels not in
+    /// `noisy`, of these alone.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`; the blocks are inside the image but for those that make up eight.
@@ -384,7 +409,7 @@ impl Neighbours {
         &self,
         first: usize,
         [column, row]: [usize; 2],
-        clean: u32,
+        noisy: u32,
     ) -> Near<S> {
         // SAFETY: as the caller's; columns hold whole groups, and an element before and behind.
         unsafe {
@@ -401,7 +426,7 @@ impl Neighbours {
                     if dx == 0.0 && dy == 0.0 {
                         own = Floats(inverse);
                     } else {
-                        there = S::and(there, S::mask(clean));
+                        there = S::and(there, S::mask(noisy));
                     }
                     sum = sum + Floats(S::and(there, inverse));
                     offset[0] = offset[0] + Floats(S::and(there, S::splat(dx)));
