@@ -104,7 +104,8 @@ fn the_second_pass_keeps_creases_sharp() {
         ("room", 120.0),
     ];
     for (name, y) in scenes {
-        for (noise, times) in [(Noise::None, 5.0), (Noise::Nguyen, 2.0), (Noise::Khoshelham, 2.0)] {
+        for (noise, times) in [(Noise::None, 25.0), (Noise::Nguyen, 2.0), (Noise::Khoshelham, 3.5)]
+        {
             let (frame, distances) = frame(name, [160.0, y], noise);
             let [single, second] = [false, true].map(|creases| {
                 let options = options(Method::CovarianceMatrix, false, creases);

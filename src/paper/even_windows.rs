@@ -32,6 +32,11 @@ pub(crate) const NEAR_NOISE: f32 = 4.0;
 pub(crate) const JAGGED: f64 = 1.4;
 pub(crate) const JAGGED_RADIUS: u32 = 2;
 pub(crate) const JAGGED_POINTS: f64 = 0.8;
+/// Planes whose inverse depths at the middle of either's window differ by more than these many variances of the noise
+/// are two surfaces. The one beyond a crease is not taken if the pixel lies on this side of it, unless this side's costs
+/// `CREASE_COST` times as much.
+pub(crate) const CREASE_NOISE: f32 = 16.0;
+pub(crate) const CREASE_COST: f32 = 10.0;
 /// Depths are exact if more than this share of the windows that a pixel can take says so.
 pub(crate) const EXACT_SHARE: f32 = 0.25;
 /// How many pixels beyond its window's edge a plane may be taken for a pixel's: outlines are ragged.
@@ -244,8 +249,7 @@ impl EvenWindows<'_> {
         let near = self.near(pixel, exact > EXACT_SHARE * found.len() as f32);
         let [x, y] = way(first, pixel);
         let (point, tolerance) = (inverse_depth(cloud.depths[own]), self.tolerance(own));
-        let mut best: Option<(f32, usize)> = None;
-        for place in found {
+        let candidate = |place: usize| {
             let window = &self.windows[place];
             let [dx, dy] = way(blocks.first(place), first);
             let [across, down] = window.slope;
@@ -255,18 +259,33 @@ impl EvenWindows<'_> {
             let per_astray = NEAR * window.per_bend;
             let jitter = JITTER * (across * across + down * down).sqrt();
 
-            let least = best.map_or(f32::INFINITY, |(least, _)| least);
-            let at = |x: f32, y: f32| at_first + across * x + down * y;
-            let astray = near.inverse_depth - at(x + near.offset[0], y + near.offset[1]);
+            let plane = Inclined { at_first, slope: window.slope };
+            let at_near = plane.at([x + near.offset[0], y + near.offset[1]]);
+            let astray = near.inverse_depth - at_near;
             let astray = (astray * astray - NEAR_NOISE * noise / near.points).max(0.0);
             let short = (distance([dx + x, dy + y]) - window.radius).max(0.0);
             let cost = (even + astray * per_astray) * (1.0 + short * short);
-            let lies_in = || (point - at(x, y)).abs() < tolerance + jitter;
-            if cost < least && (short == 0.0 || lies_in()) {
-                best = Some((cost, place));
+            let lies_in = || (point - plane.at([x, y])).abs() < tolerance + jitter;
+            let middle = [-dx, -dy];
+            (short == 0.0 || lies_in()).then_some(Candidate { place, plane, middle, cost })
+        };
+        let candidates: Vec<Candidate> = found.into_iter().filter_map(candidate).collect();
+        let mut best: Option<&Candidate> = None;
+        for candidate in &candidates {
+            if candidate.cost < best.map_or(f32::INFINITY, |best| best.cost) {
+                best = Some(candidate);
             }
         }
-        best.map(|(_, place)| place as u32)
+        // By chance the pixel may be nearer to the plane beyond a crease.
+        let mut chosen = best?;
+        let mut least = CREASE_COST * chosen.cost;
+        for candidate in &candidates {
+            if candidate.cost < least && candidate.is_this_side([x, y], best?, CREASE_NOISE * noise)
+            {
+                (chosen, least) = (candidate, candidate.cost);
+            }
+        }
+        Some(chosen.place as u32)
     }
 
     /// How far from a plane a pixel's point may lie to be on that surface, in inverse depth: half a depth change.
@@ -294,6 +313,44 @@ impl EvenWindows<'_> {
         }
         let [inverse_depth, dx, dy] = sums.map(|sum| sum / points);
         Near { inverse_depth, offset: [dx, dy], points }
+    }
+}
+
+/// A window that a pixel can take, and what it costs. Places are in pixels from the first of the pixel's block.
+struct Candidate {
+    place: usize,
+    plane: Inclined,
+    middle: [f32; 2],
+    cost: f32,
+}
+
+impl Candidate {
+    /// Whether there is a crease between this window and another, and the pixel on this one's side of it: there the
+    /// same plane is in front as in the middle of this window, and behind in that of the other. `least` is the least
+    /// squared distance between the planes of two surfaces.
+    fn is_this_side(&self, pixel: [f32; 2], other: &Candidate, least: f32) -> bool {
+        let gap = self.plane.minus(&other.plane);
+        let (here, there) = (gap.at(self.middle), gap.at(other.middle));
+        let least_gap = here.abs().min(there.abs());
+        least_gap * least_gap > least && here * there < 0.0 && here * gap.at(pixel) > 0.0
+    }
+}
+
+/// A plane by its inverse depth at the first pixel of a block, and its change per pixel to the right and down.
+struct Inclined {
+    at_first: f32,
+    slope: [f32; 2],
+}
+
+impl Inclined {
+    fn at(&self, [x, y]: [f32; 2]) -> f32 {
+        self.at_first + self.slope[0] * x + self.slope[1] * y
+    }
+
+    /// How far its inverse depths are above another's.
+    fn minus(&self, other: &Inclined) -> Inclined {
+        let slope = std::array::from_fn(|i| self.slope[i] - other.slope[i]);
+        Inclined { at_first: self.at_first - other.at_first, slope }
     }
 }
 

@@ -21,8 +21,8 @@ mod surroundings;
 pub(crate) use blocks::{BLOCK, Blocks};
 pub(crate) use cloud::{CleanPoints, Cleaned, Cloud};
 pub(crate) use even_windows::{
-    Asked, CHANCE, EXACT_SHARE, EvenWindow, EvenWindows, JAGGED, JAGGED_POINTS, JAGGED_RADIUS,
-    MISFIT, NEAR, NEAR_NOISE, PLACES, REACH, even_windows,
+    Asked, CHANCE, CREASE_COST, CREASE_NOISE, EXACT_SHARE, EvenWindow, EvenWindows, JAGGED,
+    JAGGED_POINTS, JAGGED_RADIUS, MISFIT, NEAR, NEAR_NOISE, PLACES, REACH, even_windows,
 };
 pub(crate) use methods::estimate as plain_estimate;
 pub(crate) use planes::{JITTER, Plane, inverse_depth};

@@ -5,8 +5,8 @@ use super::rects::STEPS;
 use crate::fast::arithmetic::Floats;
 use crate::fast::tile::Bits;
 use crate::paper::{
-    BLOCK, Blocks, Cloud, EXACT_SHARE, EvenWindow, EvenWindows, JITTER, MISFIT, NEAR, NEAR_NOISE,
-    PLACES, REACH, inverse_depth,
+    BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows, JITTER,
+    MISFIT, NEAR, NEAR_NOISE, PLACES, REACH, inverse_depth,
 };
 use crate::simd::{GROUP, Groups};
 
@@ -31,7 +31,7 @@ pub(super) unsafe fn row<S: Groups>(even: &EvenWindows, row: usize, choices: &mu
                 found.weigh();
                 for (y, choices) in choices.chunks_mut(even.cloud.width).enumerate() {
                     for x in 0..BLOCK {
-                        group.choose(&found, &neighbours, [x, y], choices);
+                        group.choose(&mut found, &neighbours, [x, y], choices);
                     }
                 }
             }
@@ -65,9 +65,7 @@ struct Candidates<S: Groups> {
     /// The ways from the windows' pixels to the eight blocks' first.
     to_first: [Floats<S>; 2],
     radius: Floats<S>,
-    /// The planes' inverse depths at the eight blocks' first pixels, and their slopes.
-    at_first: Floats<S>,
-    slope: [Floats<S>; 2],
+    planes: Inclined<S>,
     unevenness: Floats<S>,
     per_noise: Floats<S>,
     per_bend: Floats<S>,
@@ -75,6 +73,46 @@ struct Candidates<S: Groups> {
     even: Floats<S>,
     /// How far the sensor's noise along rows and columns moves points off the plane.
     jitter: Floats<S>,
+    /// What the windows cost a pixel of each block; infinite where they end short of it and of its surface.
+    cost: Floats<S>,
+}
+
+/// Planes by their inverse depths at the eight blocks' first pixels, and their changes per pixel to the right and down.
+#[derive(Clone, Copy)]
+struct Inclined<S: Groups> {
+    at_first: Floats<S>,
+    slope: [Floats<S>; 2],
+}
+
+impl<S: Groups> Inclined<S> {
+    /// The inverse depths so far from the blocks' first pixels.
+    #[inline(always)]
+    fn at(&self, [x, y]: [Floats<S>; 2]) -> Floats<S> {
+        self.at_first + self.slope[0] * x + self.slope[1] * y
+    }
+
+    /// How far the inverse depths are above the others'.
+    #[inline(always)]
+    fn minus(&self, other: &Inclined<S>) -> Inclined<S> {
+        let [across, down] = self.slope;
+        let slope = [across - other.slope[0], down - other.slope[1]];
+        Inclined { at_first: self.at_first - other.at_first, slope }
+    }
+
+    /// Takes the others of a mask.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn replace(&mut self, mask: S::F, other: &Inclined<S>) {
+        // SAFETY: as the caller's.
+        unsafe {
+            self.at_first.0 = S::select(mask, other.at_first.0, self.at_first.0);
+            for (own, other) in self.slope.iter_mut().zip(other.slope) {
+                own.0 = S::select(mask, other.0, own.0);
+            }
+        }
+    }
 }
 
 /// Of the points next to each of eight pixels, as the plain form has them.
@@ -92,21 +130,21 @@ impl<S: Groups> Candidates<S> {
     unsafe fn none() -> Self {
         // SAFETY: as the caller's.
         let zero = unsafe { Floats::splat(0.0) };
-        let [radius, at_first, unevenness, per_noise, per_bend, even, jitter] = [zero; 7];
+        let [radius, unevenness, per_noise, per_bend, even, jitter, cost] = [zero; 7];
         let (places, may_take) = ([0; GROUP], zero.0);
-        let (to_first, slope) = ([zero; 2], [zero; 2]);
+        let (to_first, planes) = ([zero; 2], Inclined { at_first: zero, slope: [zero; 2] });
         Candidates {
             places,
             may_take,
             to_first,
             radius,
-            at_first,
-            slope,
+            planes,
             unevenness,
             per_noise,
             per_bend,
             even,
             jitter,
+            cost,
         }
     }
 }
@@ -169,8 +207,8 @@ impl<S: Groups> Found<S> {
             to.may_take = S::and(may_take, S::and(is_near, is_there));
             to.to_first = [dx, dy];
             to.radius = Floats(radius);
-            to.at_first = Floats(inverse_depth) + across * dx + down * dy;
-            to.slope = [across, down];
+            let at_first = Floats(inverse_depth) + across * dx + down * dy;
+            to.planes = Inclined { at_first, slope: [across, down] };
             let steepness_squared = across * across + down * down;
             to.jitter = Floats::splat(JITTER) * steepness_squared.sqrt();
             to.unevenness = Floats(unevenness);
@@ -286,7 +324,7 @@ impl Group<'_> {
     #[inline(always)]
     unsafe fn choose<S: Groups>(
         &self,
-        found: &Found<S>,
+        found: &mut Found<S>,
         neighbours: &Neighbours,
         [column, row]: [usize; 2],
         choices: &mut [Option<u32>],
@@ -311,25 +349,44 @@ impl Group<'_> {
             let tolerance = Floats::load(tolerances.as_ptr());
             let near_noise = Floats::splat(NEAR_NOISE) * found.noise / near.points;
             let at_near = [column + near.offset[0], row + near.offset[1]];
+            let crease_noise = Floats::splat(CREASE_NOISE) * found.noise;
             let mut least = Floats::<S>::splat(f32::INFINITY);
             let mut best = S::splat(-1.0);
-            let found = &found.candidates[..found.number];
-            for (number, candidates) in found.iter().enumerate() {
-                let [across, down] = candidates.slope;
-                let at_near = candidates.at_first + across * at_near[0] + down * at_near[1];
-                let astray = near.inverse_depth - at_near;
+            let mut planes = Inclined { at_first: zero, slope: [zero; 2] };
+            let mut middle = [zero; 2];
+            let found = &mut found.candidates[..found.number];
+            for (number, candidates) in found.iter_mut().enumerate() {
+                let astray = near.inverse_depth - candidates.planes.at(at_near);
                 let astray = (astray * astray - near_noise).max(zero);
                 let per_astray = Floats::splat(NEAR) * candidates.per_bend;
                 let [dx, dy] = candidates.to_first;
                 let distance = (dx + column).abs().max((dy + row).abs());
                 let short = (distance - candidates.radius).max(zero);
                 let cost = (candidates.even + astray * per_astray) * (one + short * short);
-                let at_pixel = candidates.at_first + across * column + down * row;
-                let off = (near.own - at_pixel).abs();
+                let off = (near.own - candidates.planes.at([column, row])).abs();
                 let lies_in = S::lt(off.0, (tolerance + candidates.jitter).0);
                 let is_beyond = S::and_not(lies_in, S::lt(zero.0, short.0));
-                let better = S::and_not(is_beyond, S::lt(cost.0, least.0));
+                candidates.cost.0 = S::select(is_beyond, S::splat(f32::INFINITY), cost.0);
+                let better = S::lt(candidates.cost.0, least.0);
                 least.0 = S::select(better, cost.0, least.0);
+                best = S::select(better, S::splat(number as f32), best);
+                planes.replace(better, &candidates.planes);
+                middle[0].0 = S::select(better, (zero - dx).0, middle[0].0);
+                middle[1].0 = S::select(better, (zero - dy).0, middle[1].0);
+            }
+            // By chance the pixel may be nearer to the plane beyond a crease.
+            least = Floats::splat(CREASE_COST) * least;
+            for (number, candidates) in found.iter().enumerate() {
+                let is_better = S::lt(candidates.cost.0, least.0);
+                let gap = candidates.planes.minus(&planes);
+                let [dx, dy] = candidates.to_first;
+                let (here, there) = (gap.at([zero - dx, zero - dy]), gap.at(middle));
+                let least_gap = Floats::<S>(S::min(here.abs().0, there.abs().0));
+                let are_two = S::lt(crease_noise.0, (least_gap * least_gap).0);
+                let is_crease = S::and(are_two, S::lt((here * there).0, zero.0));
+                let is_this_side = S::lt(zero.0, (here * gap.at([column, row])).0);
+                let better = S::and(is_better, S::and(is_crease, is_this_side));
+                least.0 = S::select(better, candidates.cost.0, least.0);
                 best = S::select(better, S::splat(number as f32), best);
             }
             let mut numbers = [0; GROUP];
