@@ -1,4 +1,5 @@
-//! Prints mean and median error with coverage by band, per scene, noise and mode.
+//! Prints mean and median error with coverage by band, per scene, noise and mode; and of the normals that the pixels
+//! have without noise, as `truth`: noise moves points to where other pixels look.
 //!
 //! usage: bands [SCENE,...|all [NOISE,... [MODE,...]]]
 
@@ -28,9 +29,12 @@ fn main() {
         let noise = Noise::by_name(noise_name).expect("a known noise");
         let frame = noise.apply(&exact, &mut Random::new(1));
         let mut text = String::new();
-        for mode in &modes {
+        let found = modes.iter().map(|mode| {
             let normals = mode.normals(&frame.points, frame.width()).expect("normals");
-            text += &format!("{name:10} {noise_name:10} {:12}", mode.name);
+            (mode.name.as_str(), normals)
+        });
+        for (who, normals) in found.chain([("truth", exact.normals.clone())]) {
+            text += &format!("{name:10} {noise_name:10} {who:12}");
             for score in by_band(&frame, &distances, &normals, 0..normals.len()) {
                 text += &format!(
                     " | {:6.2} {:6.2} {:6.2}%",
