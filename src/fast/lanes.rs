@@ -36,12 +36,14 @@ impl Lanes {
         lanes
     }
 
+    /// As many of the first as `S` has lanes.
+    ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     pub unsafe fn load<S: Simd>(&self) -> S::F {
-        const { assert!(S::LANES == LANES) };
-        // SAFETY: as the caller's; all of it is loaded.
+        const { assert!(S::LANES <= LANES) };
+        // SAFETY: as the caller's; there are that many.
         unsafe { S::load(self.0.as_ptr()) }
     }
 

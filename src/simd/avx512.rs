@@ -97,6 +97,7 @@ impl Simd for Avx512 {
 
 impl Groups for Avx512 {
     type Pair = Avx512Pair;
+    type Widest = Self::Pair;
 
     calls! {
         load_halves(low: *const f32, high: *const f32) -> Self::F = Avx2::load_halves;

@@ -133,6 +133,8 @@ pub(crate) trait Groups: Simd {
     ///
     /// [`Twice`]: twice::Twice
     type Pair: Simd;
+    /// As many lanes as a register of floats has, but no fewer than a group.
+    type Widest: Simd;
 
     /// Lanes 0 to 3 from one place, 4 to 7 from another.
     unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F;

@@ -295,6 +295,7 @@ impl Simd for Neon {
 
 impl Groups for Neon {
     type Pair = Twice<Self>;
+    type Widest = Self;
 
     #[inline(always)]
     unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {

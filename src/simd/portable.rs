@@ -253,6 +253,7 @@ impl Simd for Portable {
 
 impl Groups for Portable {
     type Pair = Twice<Self>;
+    type Widest = Self;
 
     #[inline(always)]
     unsafe fn load_halves(low: *const f32, high: *const f32) -> F {

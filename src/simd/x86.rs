@@ -242,6 +242,7 @@ impl Simd for Sse2 {
 
 impl Groups for Sse2 {
     type Pair = Twice<Self>;
+    type Widest = Self;
 
     #[inline(always)]
     unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {
@@ -517,6 +518,7 @@ impl Simd for Avx2 {
 
 impl Groups for Avx2 {
     type Pair = Twice<Self>;
+    type Widest = Self;
 
     #[inline(always)]
     unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {

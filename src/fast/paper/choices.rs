@@ -1,14 +1,15 @@
 //! Which even window each pixel takes, fast, for one row of blocks: the plain form is in `paper::even_windows`. The
-//! windows at one place of eight blocks are gathered together, and weighed for a pixel of each at a time.
+//! windows at one place of as many blocks as there are lanes are gathered together, and weighed for a pixel of each at a
+//! time.
 
-use super::rects::STEPS;
 use crate::fast::arithmetic::Floats;
+use crate::fast::lanes::{LANES, Lanes};
 use crate::fast::tile::Bits;
 use crate::paper::{
     BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows, JITTER,
     MISFIT, NEAR, NEAR_NOISE, PLACES, REACH, inverse_depth,
 };
-use crate::simd::{GROUP, Groups};
+use crate::simd::{GROUP, Groups, Simd};
 
 /// Finds the choices of the pixels of a row of blocks, which are none so far.
 ///
@@ -18,17 +19,17 @@ use crate::simd::{GROUP, Groups};
 pub(super) unsafe fn row<S: Groups>(even: &EvenWindows, row: usize, choices: &mut [Option<u32>]) {
     let neighbours = Neighbours::new(even.cloud, row);
     // SAFETY: as the caller's.
-    let least_noise = unsafe { Floats::<S>::splat(even.asked.least_noise) };
-    let [noise, there, exact] = [least_noise; 3];
-    let mut found = Found { candidates: Vec::new(), number: 0, least_noise, noise, there, exact };
+    let noise = unsafe { Floats::<S::Widest>::splat(0.0) };
+    let mut found = Found { candidates: Vec::new(), number: 0, noise, exact: noise.0 };
     let across = even.asked.blocks.across;
-    for first in (0..across).step_by(GROUP) {
-        let group = Group { even, row, first, count: (across - first).min(GROUP) };
+    let lanes = S::Widest::LANES;
+    for first in (0..across).step_by(lanes) {
+        let group = Group { even, row, first, count: (across - first).min(lanes) };
         // SAFETY: as the caller's.
         unsafe {
-            group.candidates(&mut found);
+            group.candidates::<S>(&mut found);
             if found.number > 0 {
-                found.weigh();
+                found.weigh(even.asked.least_noise);
                 for (y, choices) in choices.chunks_mut(even.cloud.width).enumerate() {
                     for x in 0..BLOCK {
                         group.choose(&mut found, &neighbours, [x, y], choices);
@@ -39,7 +40,7 @@ pub(super) unsafe fn row<S: Groups>(even: &EvenWindows, row: usize, choices: &mu
     }
 }
 
-/// Eight blocks of a row, of which `count` are inside the image.
+/// Blocks side by side of a row, of which `count` are inside the image.
 struct Group<'a> {
     even: &'a EvenWindows<'a>,
     row: usize,
@@ -48,28 +49,28 @@ struct Group<'a> {
     count: usize,
 }
 
-/// Columns or rows of blocks, one for each of eight.
-struct Lines<S: Groups> {
+/// Columns or rows of blocks, one for each block of a group.
+struct Lines<S: Simd> {
     /// The number of the first block in the row, or that of the column.
-    first: [usize; GROUP],
-    /// The ways in pixels to the eight's own.
+    first: [usize; LANES],
+    /// The ways in pixels to the blocks' own.
     to_own: Floats<S>,
 }
 
-/// Windows that the pixels of eight blocks may take, one each.
-struct Candidates<S: Groups> {
+/// Windows that the pixels of a group may take, one each.
+struct Candidates<S: Simd> {
     /// The blocks whose windows they are.
-    places: [u32; GROUP],
+    places: [u32; LANES],
+    /// Field by field, each of as many floats as there are lanes.
+    windows: [Lanes; FIELDS],
     /// The mask of the blocks that may take theirs.
     may_take: S::F,
-    /// The ways from the windows' pixels to the eight blocks' first.
+    /// The ways from the windows' pixels to the blocks' first.
     to_first: [Floats<S>; 2],
     radius: Floats<S>,
     planes: Inclined<S>,
-    unevenness: Floats<S>,
-    per_noise: Floats<S>,
     per_bend: Floats<S>,
-    /// What the windows cost any pixel, once the noise is known; infinite for those that may not take theirs.
+    /// What the windows cost any pixel; infinite for those that may not take theirs.
     even: Floats<S>,
     /// How far the sensor's noise along rows and columns moves points off the plane.
     jitter: Floats<S>,
@@ -77,14 +78,17 @@ struct Candidates<S: Groups> {
     cost: Floats<S>,
 }
 
-/// Planes by their inverse depths at the eight blocks' first pixels, and their changes per pixel to the right and down.
+/// The fields of an [`EvenWindow`].
+const FIELDS: usize = size_of::<EvenWindow>() / size_of::<f32>();
+
+/// Planes by their inverse depths at the blocks' first pixels, and their changes per pixel to the right and down.
 #[derive(Clone, Copy)]
-struct Inclined<S: Groups> {
+struct Inclined<S: Simd> {
     at_first: Floats<S>,
     slope: [Floats<S>; 2],
 }
 
-impl<S: Groups> Inclined<S> {
+impl<S: Simd> Inclined<S> {
     /// The inverse depths so far from the blocks' first pixels.
     #[inline(always)]
     fn at(&self, [x, y]: [Floats<S>; 2]) -> Floats<S> {
@@ -115,8 +119,8 @@ impl<S: Groups> Inclined<S> {
     }
 }
 
-/// Of the points next to each of eight pixels, as the plain form has them.
-struct Near<S: Groups> {
+/// Of the points next to a pixel of each block, as the plain form has them.
+struct Near<S: Simd> {
     inverse_depth: Floats<S>,
     offset: [Floats<S>; 2],
     points: Floats<S>,
@@ -124,60 +128,63 @@ struct Near<S: Groups> {
     own: Floats<S>,
 }
 
-impl<S: Groups> Candidates<S> {
+impl<S: Simd> Candidates<S> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     unsafe fn none() -> Self {
         // SAFETY: as the caller's.
         let zero = unsafe { Floats::splat(0.0) };
-        let [radius, unevenness, per_noise, per_bend, even, jitter, cost] = [zero; 7];
-        let (places, may_take) = ([0; GROUP], zero.0);
-        let (to_first, planes) = ([zero; 2], Inclined { at_first: zero, slope: [zero; 2] });
         Candidates {
-            places,
-            may_take,
-            to_first,
-            radius,
-            planes,
-            unevenness,
-            per_noise,
-            per_bend,
-            even,
-            jitter,
-            cost,
+            places: [0; LANES],
+            windows: [Lanes::ZERO; FIELDS],
+            may_take: zero.0,
+            to_first: [zero; 2],
+            radius: zero,
+            planes: Inclined { at_first: zero, slope: [zero; 2] },
+            per_bend: zero,
+            even: zero,
+            jitter: zero,
+            cost: zero,
         }
+    }
+
+    /// # Safety
+    /// The processor has the instruction set of `S`; there is such a field.
+    #[inline(always)]
+    unsafe fn field(&self, field: usize) -> Floats<S> {
+        debug_assert!(field < FIELDS);
+        // SAFETY: as the caller's; there is room for fields of `LANES`.
+        unsafe { Floats::load(self.windows.as_ptr().cast::<f32>().add(field * S::LANES)) }
     }
 }
 
-/// The windows that the pixels of eight blocks may take.
-struct Found<S: Groups> {
+/// The windows that the pixels of a group may take.
+struct Found<S: Simd> {
     /// Only so many mean something.
     candidates: Vec<Candidates<S>>,
     number: usize,
-    /// The least noise that is told from none, and the least among them.
-    least_noise: Floats<S>,
+    /// The least among them.
     noise: Floats<S>,
-    /// How many windows there are for each block, and how many of exact depths.
-    there: Floats<S>,
-    exact: Floats<S>,
+    /// The mask of the blocks whose windows say that depths are exact.
+    exact: S::F,
 }
 
-impl<S: Groups> Found<S> {
-    /// Adds the windows of the blocks in these columns and rows, for the eight blocks of a mask.
+impl<S: Simd> Found<S> {
+    /// Adds the windows of the blocks in these columns and rows, for the blocks of a mask.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`; the columns and rows are inside the image.
+    /// The processor has the instruction set of `G`; the columns and rows are inside the image.
     #[inline(always)]
-    unsafe fn add(
+    unsafe fn add<G: Groups<Widest = S>>(
         &mut self,
         windows: &[EvenWindow],
         columns: &Lines<S>,
         rows: &Lines<S>,
         may_take: S::F,
     ) {
-        const { assert!(size_of::<EvenWindow>() == 8 * size_of::<f32>()) };
+        const { assert!(FIELDS == 8) };
         let place = |lane: usize| columns.first[lane] + rows.first[lane];
-        debug_assert!((0..GROUP).all(|lane| place(lane) < windows.len()));
+        debug_assert!((0..S::LANES).all(|lane| place(lane) < windows.len()));
         let windows = windows.as_ptr();
         if self.number == self.candidates.len() {
             // SAFETY: as the caller's.
@@ -185,44 +192,28 @@ impl<S: Groups> Found<S> {
         }
         let to = &mut self.candidates[self.number];
         self.number += 1;
-        for lane in 0..GROUP {
+        for lane in 0..S::LANES {
             to.places[lane] = place(lane) as u32;
         }
-        // SAFETY: as the caller's; a window is eight floats.
-        unsafe {
-            let (mut front, mut back) = ([S::splat(0.0); 4], [S::splat(0.0); 4]);
-            for i in 0..4 {
-                let at = |lane: usize| windows.add(place(lane)).cast::<f32>();
-                let (low, high) = (at(i), at(i + 4));
-                front[i] = S::load_halves(low, high);
-                back[i] = S::load_halves(low.add(4), high.add(4));
+        to.may_take = may_take;
+        to.to_first = [columns.to_own, rows.to_own];
+        for group in (0..S::LANES).step_by(GROUP) {
+            let to = to.windows.as_mut_ptr().cast::<f32>().wrapping_add(group);
+            // SAFETY: as the caller's; a window is eight floats.
+            unsafe {
+                let (mut front, mut back) = ([G::splat(0.0); 4], [G::splat(0.0); 4]);
+                for i in 0..4 {
+                    let at = |lane: usize| windows.add(place(group + lane)).cast::<f32>();
+                    let (low, high) = (at(i), at(i + 4));
+                    front[i] = G::load_halves(low, high);
+                    back[i] = G::load_halves(low.add(4), high.add(4));
+                }
+                let (front, back) = (G::transpose_halves(front), G::transpose_halves(back));
+                for i in 0..4 {
+                    G::store(to.add(i * S::LANES), front[i]);
+                    G::store(to.add((i + 4) * S::LANES), back[i]);
+                }
             }
-            let [radius, inverse_depth, across, down] = S::transpose_halves(front);
-            let [unevenness, noise, per_noise, per_bend] = S::transpose_halves(back);
-            let (across, down) = (Floats(across), Floats(down));
-            let [dx, dy] = [columns.to_own, rows.to_own];
-            let reach = Floats::<S>(radius) + Floats::splat(REACH + 1.0);
-            let is_near = S::lt(dx.abs().max(dy.abs()).0, reach.0);
-            let is_there = S::lt(S::splat(0.0), radius);
-            to.may_take = S::and(may_take, S::and(is_near, is_there));
-            to.to_first = [dx, dy];
-            to.radius = Floats(radius);
-            let at_first = Floats(inverse_depth) + across * dx + down * dy;
-            to.planes = Inclined { at_first, slope: [across, down] };
-            let steepness_squared = across * across + down * down;
-            to.jitter = Floats::splat(JITTER) * steepness_squared.sqrt();
-            to.unevenness = Floats(unevenness);
-            to.per_noise = Floats(per_noise);
-            to.per_bend = Floats(per_bend);
-            let less = S::min(noise, self.noise.0);
-            self.noise.0 = S::select(to.may_take, less, self.noise.0);
-            let is_exact = S::and(
-                S::lt(noise, self.least_noise.0),
-                S::lt(self.least_noise.0, steepness_squared.0),
-            );
-            let one = S::and(to.may_take, S::splat(1.0));
-            self.there = self.there + Floats(one);
-            self.exact = self.exact + Floats(S::and(is_exact, one));
         }
     }
 
@@ -231,28 +222,43 @@ impl<S: Groups> Found<S> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn weigh(&mut self) {
+    unsafe fn weigh(&mut self, least_noise: f32) {
         // SAFETY: as the caller's.
         unsafe {
-            self.noise = self.noise.max(self.least_noise);
-            for candidates in &mut self.candidates[..self.number] {
-                let misfit = (candidates.unevenness - self.noise).max(Floats::splat(0.0));
-                let even = self.noise * candidates.per_noise
-                    + Floats::splat(MISFIT) * misfit * candidates.per_bend;
-                let never = S::splat(f32::INFINITY);
-                candidates.even = Floats(S::select(candidates.may_take, even.0, never));
+            let (zero, one) = (Floats::<S>::splat(0.0), S::splat(1.0));
+            let least_noise = Floats::<S>::splat(least_noise);
+            let (mut least, mut there, mut exact) = (Floats::splat(f32::INFINITY), zero, zero);
+            for to in &mut self.candidates[..self.number] {
+                let [radius, inverse_depth, across, down, _, noise, _, per_bend] =
+                    std::array::from_fn(|field| to.field(field));
+                let [dx, dy] = to.to_first;
+                let is_near =
+                    S::lt(dx.abs().max(dy.abs()).0, (radius + Floats::splat(REACH + 1.0)).0);
+                to.may_take = S::and(to.may_take, S::and(is_near, S::lt(zero.0, radius.0)));
+                to.radius = radius;
+                let at_first = inverse_depth + across * dx + down * dy;
+                to.planes = Inclined { at_first, slope: [across, down] };
+                let steepness_squared = across * across + down * down;
+                to.jitter = Floats::splat(JITTER) * steepness_squared.sqrt();
+                to.per_bend = per_bend;
+                least.0 = S::select(to.may_take, S::min(noise.0, least.0), least.0);
+                let is_exact = S::and(
+                    S::lt(noise.0, least_noise.0),
+                    S::lt(least_noise.0, steepness_squared.0),
+                );
+                let one = S::and(to.may_take, one);
+                there = there + Floats(one);
+                exact = exact + Floats(S::and(is_exact, one));
+            }
+            self.exact = S::lt((Floats::splat(EXACT_SHARE) * there).0, exact.0);
+            self.noise = least.max(least_noise);
+            for to in &mut self.candidates[..self.number] {
+                let (unevenness, per_noise) = (to.field(4), to.field(6));
+                let misfit = (unevenness - self.noise).max(zero);
+                let even = self.noise * per_noise + Floats::splat(MISFIT) * misfit * to.per_bend;
+                to.even = Floats(S::select(to.may_take, even.0, S::splat(f32::INFINITY)));
             }
         }
-    }
-
-    /// The mask of the blocks whose windows say that depths are exact.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    unsafe fn are_exact(&self) -> S::F {
-        // SAFETY: as the caller's.
-        unsafe { S::lt((Floats::splat(EXACT_SHARE) * self.there).0, self.exact.0) }
     }
 }
 
@@ -262,55 +268,57 @@ impl Group<'_> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn candidates<S: Groups>(&self, found: &mut Found<S>) {
+    unsafe fn candidates<G: Groups>(&self, found: &mut Found<G::Widest>) {
         let &Group { even, row, first, count } = self;
         let Blocks { across, down, .. } = even.asked.blocks;
         let own = row * across + first;
-        let (mut levels, mut radii) = ([0.0; GROUP], [0.0; GROUP]);
+        let (mut levels, mut radii) = (Lanes::ZERO, Lanes::ZERO);
         for lane in 0..count {
             let level = even.asked.levels[own + lane];
-            levels[lane] = f32::from(level);
+            levels.0[lane] = f32::from(level);
             if level > 0 {
-                radii[lane] = even.asked.largest(own + lane) as f32;
+                radii.0[lane] = even.asked.largest(own + lane) as f32;
             }
         }
         found.number = 0;
         // SAFETY: as the caller's; all places are inside the image.
         unsafe {
-            let zero = Floats::<S>::splat(0.0);
-            found.noise = Floats::splat(f32::INFINITY);
-            (found.there, found.exact) = (zero, zero);
-            let levels = S::load(levels.as_ptr());
-            let mut radii = Floats::<S>::load(radii.as_ptr());
+            let zero = Floats::<G::Widest>::splat(0.0);
+            let levels = levels.load::<G::Widest>();
+            let mut radii = Floats::<G::Widest>(radii.load::<G::Widest>());
             let mut level = 0.0;
-            let takes_any = S::lt(zero.0, levels);
-            if S::bits(takes_any) == 0 {
+            let takes_any = <G::Widest as Simd>::lt(zero.0, levels);
+            if <G::Widest as Simd>::bits(takes_any) == 0 {
                 return;
             }
             // Lanes outside the image stand for the last block of the row.
-            let last = Floats::<S>::splat((across - 1) as f32);
-            let column = Floats::<S>::load(STEPS.as_ptr()) + Floats::splat(first as f32);
-            let column = Floats::<S>(S::min(column.0, last.0));
-            let row = Floats::<S>::splat(row as f32);
-            let own = [lines::<S>(column, column, 1), lines(row, row, across)];
-            found.add(even.windows, &own[0], &own[1], takes_any);
+            let last = Floats::<G::Widest>::splat((across - 1) as f32);
+            let column = std::array::from_fn(|lane| (first + lane) as f32);
+            let column = Floats::<G::Widest>(Lanes(column).load::<G::Widest>());
+            let column = Floats::<G::Widest>(<G::Widest as Simd>::min(column.0, last.0));
+            let row = Floats::<G::Widest>::splat(row as f32);
+            let own = [lines::<G::Widest>(column, column, 1), lines(row, row, across)];
+            found.add::<G>(even.windows, &own[0], &own[1], takes_any);
             loop {
-                let may_take = S::and(S::lt(zero.0, radii.0), S::lt(S::splat(level), levels));
-                if S::bits(may_take) == 0 {
+                let may_take = <G::Widest as Simd>::and(
+                    <G::Widest as Simd>::lt(zero.0, radii.0),
+                    <G::Widest as Simd>::lt(<G::Widest as Simd>::splat(level), levels),
+                );
+                if <G::Widest as Simd>::bits(may_take) == 0 {
                     break;
                 }
                 // Rounded up.
                 let distance =
                     (radii + Floats::splat(BLOCK as f32 - 1.0)) / Floats::splat(BLOCK as f32);
-                let distance = Floats(S::truncate(distance.0));
+                let distance = Floats(<G::Widest as Simd>::truncate(distance.0));
                 let [left, right] = around(column, distance, across, 1);
                 let [above, below] = around(row, distance, down, across);
                 let columns = [&left, &own[0], &right];
                 let rows = [&above, &own[1], &below];
                 for (column, row) in PLACES {
-                    found.add(even.windows, columns[column], rows[row], may_take);
+                    found.add::<G>(even.windows, columns[column], rows[row], may_take);
                 }
-                radii = Floats(S::truncate((radii * Floats::splat(0.5)).0));
+                radii = Floats(<G::Widest as Simd>::truncate((radii * Floats::splat(0.5)).0));
                 level += 1.0;
             }
         }
@@ -322,7 +330,7 @@ impl Group<'_> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn choose<S: Groups>(
+    unsafe fn choose<S: Simd>(
         &self,
         found: &mut Found<S>,
         neighbours: &Neighbours,
@@ -332,21 +340,21 @@ impl Group<'_> {
         let cloud = self.even.cloud;
         let x = self.first * BLOCK + column;
         let pixels = (self.row * BLOCK + row) * cloud.width + x;
-        let mut tolerances = [0.0; GROUP];
-        let (mut there, mut clean) = (0, 0);
+        let (mut tolerances, mut clean) = (Lanes::ZERO, Lanes::ZERO);
+        let mut there = 0;
         for lane in (0..self.count).take_while(|lane| x + lane * BLOCK < cloud.width) {
             let pixel = pixels + lane * BLOCK;
             there |= u32::from(!cloud.is_missing(pixel)) << lane;
-            clean |= u32::from(self.even.asked.clean[pixel] > 0) << lane;
-            tolerances[lane] = self.even.tolerance(pixel);
+            clean.0[lane] = self.even.asked.clean[pixel] as f32;
+            tolerances.0[lane] = self.even.tolerance(pixel);
         }
         // SAFETY: as the caller's.
         unsafe {
-            let noisy = clean & !S::bits(found.are_exact());
+            let noisy = S::and_not(found.exact, S::lt(S::splat(0.0), clean.load::<S>()));
             let near = neighbours.near::<S>(self.first, [column, row], noisy);
             let (zero, one) = (Floats::splat(0.0), Floats::splat(1.0));
             let [column, row] = [column, row].map(|at| Floats::splat(at as f32));
-            let tolerance = Floats::load(tolerances.as_ptr());
+            let tolerance = Floats(tolerances.load::<S>());
             let near_noise = Floats::splat(NEAR_NOISE) * found.noise / near.points;
             let at_near = [column + near.offset[0], row + near.offset[1]];
             let crease_noise = Floats::splat(CREASE_NOISE) * found.noise;
@@ -389,7 +397,7 @@ impl Group<'_> {
                 least.0 = S::select(better, candidates.cost.0, least.0);
                 best = S::select(better, S::splat(number as f32), best);
             }
-            let mut numbers = [0; GROUP];
+            let mut numbers = [0; LANES];
             S::store_i(numbers.as_mut_ptr(), S::truncate_i(best));
             for lane in Bits(there) {
                 let best = found.get(numbers[lane] as usize);
@@ -399,13 +407,13 @@ impl Group<'_> {
     }
 }
 
-/// The columns or rows `at`, which lie `number` blocks apart, on the way to those of the eight blocks.
+/// The columns or rows `at`, which lie `number` blocks apart, on the way to those of the blocks.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn lines<S: Groups>(own: Floats<S>, at: Floats<S>, number: usize) -> Lines<S> {
-    let mut first = [0; GROUP];
+unsafe fn lines<S: Simd>(own: Floats<S>, at: Floats<S>, number: usize) -> Lines<S> {
+    let mut first = [0; LANES];
     // SAFETY: as the caller's.
     let to_own = unsafe {
         S::store_i(first.as_mut_ptr(), S::truncate_i(at.0));
@@ -414,12 +422,12 @@ unsafe fn lines<S: Groups>(own: Floats<S>, at: Floats<S>, number: usize) -> Line
     Lines { first: first.map(|line| line as usize * number), to_own }
 }
 
-/// The columns or rows, of so many, at distances before and behind the eight blocks' own.
+/// The columns or rows, of so many, at distances before and behind the blocks' own.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn around<S: Groups>(
+unsafe fn around<S: Simd>(
     own: Floats<S>,
     distance: Floats<S>,
     count: usize,
@@ -441,7 +449,7 @@ struct Neighbours {
 
 impl Neighbours {
     fn new(cloud: &Cloud, row: usize) -> Self {
-        let length = cloud.width.div_ceil(BLOCK).next_multiple_of(GROUP) + 2;
+        let length = cloud.width.div_ceil(BLOCK).next_multiple_of(LANES) + 2;
         let inverse_depths = std::array::from_fn(|line| {
             let mut columns = std::array::from_fn(|_| vec![f32::NAN; length]);
             let y = (row * BLOCK + line).wrapping_sub(1);
@@ -456,17 +464,17 @@ impl Neighbours {
         Neighbours { inverse_depths }
     }
 
-    /// Of the points next to those in a column and row of eight blocks from column `first` on; around pixels not in
-    /// `noisy`, of these alone.
+    /// Of the points next to those in a column and row of the blocks from column `first` on; around pixels not in
+    /// the mask `noisy`, of these alone.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`; the blocks are inside the image but for those that make up eight.
+    /// The processor has the instruction set of `S`; the blocks are inside the image but for those that make up the lanes.
     #[inline(always)]
-    unsafe fn near<S: Groups>(
+    unsafe fn near<S: Simd>(
         &self,
         first: usize,
         [column, row]: [usize; 2],
-        noisy: u32,
+        noisy: S::F,
     ) -> Near<S> {
         // SAFETY: as the caller's; columns hold whole groups, and an element before and behind.
         unsafe {
@@ -483,7 +491,7 @@ impl Neighbours {
                     if dx == 0.0 && dy == 0.0 {
                         own = Floats(inverse);
                     } else {
-                        there = S::and(there, S::mask(noisy));
+                        there = S::and(there, noisy);
                     }
                     sum = sum + Floats(S::and(there, inverse));
                     offset[0] = offset[0] + Floats(S::and(there, S::splat(dx)));
