@@ -24,7 +24,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use buffer::Buffer;
 use half_windows::HalfWindows;
-use lanes::Lanes;
+use lanes::{LANES, Lanes};
 use moments::Moments;
 use paths::Task;
 use planes::{Frame, Planes};
@@ -296,7 +296,7 @@ impl Job<'_> {
                 Method::Simple3DGradient => Strips::<true>::COLUMN,
             };
         let ring = (reach + 2).next_power_of_two();
-        let columns = (TILE_BYTES / (column * ring)).max(2 * reach).next_multiple_of(2 * GROUP);
+        let columns = (TILE_BYTES / (column * ring)).max(2 * reach).next_multiple_of(LANES);
         let across = width.div_ceil(columns);
         // Tiles of like widths.
         let columns = width.div_ceil(across).next_multiple_of(GROUP);

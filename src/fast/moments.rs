@@ -243,7 +243,7 @@ impl Sums for Moments {
         lanes: u32,
         run: &mut Matrices,
         at: usize,
-    ) -> u32 {
+    ) -> bool {
         let sum_up = |lane: usize| {
             let ((x, y), side) = windows(lane);
             let half = (side / 2) as isize;
@@ -253,7 +253,7 @@ impl Sums for Moments {
         };
         // SAFETY: as the caller's.
         unsafe { run.note_afresh::<S>(at, lanes, sum_up) };
-        lanes
+        true
     }
 
     #[inline(always)]

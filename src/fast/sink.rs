@@ -1,5 +1,6 @@
 //! Where a tile's normals go: to every pixel, or to the places of the pixels that indices list.
 
+use super::lanes::LANES;
 use super::tile::Estimates;
 use crate::Error;
 use crate::cloud::Normals;
@@ -95,6 +96,6 @@ impl<'a> Sink<'a> {
     #[inline(always)]
     pub unsafe fn write_none(&self, x: usize, y: usize, count: usize) {
         // SAFETY: as the caller's.
-        unsafe { self.write(x, y, count, &Estimates::<{ 2 * GROUP }>::NONE, false) };
+        unsafe { self.write(x, y, count, &Estimates::<LANES>::NONE, false) };
     }
 }

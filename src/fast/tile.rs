@@ -119,7 +119,7 @@ pub(crate) trait Sums {
     unsafe fn put<S: Simd>(sums: &mut Self::OfLanes<S>, lane: usize, one: Self::Of1);
 
     /// Notes windows of some lanes of a pair of groups, which is `at` in its run, from their points, without the rings'
-    /// rounding; returns which: the others are left to the plain form. What was noted of the pair before is lost.
+    /// rounding; returns whether: else they are left to the plain form. What was noted of the pair before is lost.
     /// `windows` gives a lane's pixel and side.
     ///
     /// # Safety
@@ -131,8 +131,8 @@ pub(crate) trait Sums {
         _lanes: u32,
         _run: &mut Self::OfRun,
         _at: usize,
-    ) -> u32 {
-        0
+    ) -> bool {
+        false
     }
 
     /// Notes what the normals of the pixels from `at` on in a run are made from.
@@ -349,12 +349,11 @@ impl Tile<'_> {
                 if doubtful != 0 {
                     let window = |lane: usize| ((x + lane, y), row[x + lane] as usize);
                     let (points, image) = (self.points, self.image);
-                    let tried = M::afresh::<S>(points, image, window, doubtful, of_run, at);
-                    if tried != 0 {
-                        of_run.solve::<S>(at, &[tried]);
+                    if M::afresh::<S>(points, image, window, doubtful, of_run, at) {
+                        of_run.solve::<S>(at, &[doubtful]);
                         let fresh = sums.estimate::<S::Pair>(of_run, at, sides, true);
-                        found.take(tried, &fresh);
-                        plain &= !tried | fresh.doubtful;
+                        found.take(doubtful, &fresh);
+                        plain &= !doubtful | fresh.doubtful;
                     }
                 }
                 let column = frame.column(x);

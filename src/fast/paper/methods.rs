@@ -43,7 +43,7 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
     );
 
     /// Notes windows of some lanes of a pair of groups, which is `at` in its run, from their points, without the rings'
-    /// rounding; returns which: the others are left to the plain form. What was noted of the pair before is lost.
+    /// rounding; returns whether: else they are left to the plain form. What was noted of the pair before is lost.
     ///
     /// # Safety
     /// As [`Sums::note`].
@@ -53,8 +53,8 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
         _lanes: u32,
         _run: &mut Self::OfRun,
         _at: usize,
-    ) -> u32 {
-        0
+    ) -> bool {
+        false
     }
 
     /// The normals of the pixels from `at` on in a run, which are solved.
@@ -135,11 +135,11 @@ impl Sums<MOMENTS> for CovarianceMatrix {
         lanes: u32,
         run: &mut Matrices,
         at: usize,
-    ) -> u32 {
+    ) -> bool {
         let sum_up = |lane: usize| sum_of_moments(points.finite(&rect(lane)));
         // SAFETY: as the caller's.
         unsafe { run.note_afresh::<S>(at, lanes, sum_up) };
-        lanes
+        true
     }
 
     #[inline(always)]

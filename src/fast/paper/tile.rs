@@ -168,14 +168,11 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 };
                 let mut found = M::estimate::<S::Pair>(sums, at, error);
                 let mut plain = found.doubtful & windows;
-                if plain != 0 {
-                    let fresh = M::afresh::<S>(&cleaned, rect, plain, sums, at);
-                    if fresh != 0 {
-                        sums.solve::<S>(at, &[fresh]);
-                        let again = M::estimate::<S::Pair>(sums, at, 0.0);
-                        found.take(fresh, &again);
-                        plain &= !fresh | again.doubtful;
-                    }
+                if plain != 0 && M::afresh::<S>(&cleaned, rect, plain, sums, at) {
+                    sums.solve::<S>(at, &[plain]);
+                    let fresh = M::estimate::<S::Pair>(sums, at, 0.0);
+                    found.take(plain, &fresh);
+                    plain &= fresh.doubtful;
                 }
                 let viewpoint = self.options.viewpoint;
                 let (sure, here) = (windows & !plain, points.load::<S::Pair>(at));
