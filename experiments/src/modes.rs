@@ -70,12 +70,10 @@ impl Mode {
                         modes.push(Mode::new(semantics, method, one_sided, creases));
                     }
                 }
+                if semantics == Semantics::Paper {
+                    modes.extend([3, 5].map(|side| Mode::of_exact_depths(method, side)));
+                }
             }
-        }
-        for method in
-            [Method::CovarianceMatrix, Method::Average3DGradient, Method::AverageDepthChange]
-        {
-            modes.extend([3, 5].map(|side| Mode::of_exact_depths(method, side)));
         }
         modes
     }

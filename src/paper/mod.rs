@@ -5,6 +5,7 @@
 //! image, and that a method turns the points in a rectangle into a normal.
 
 mod blocks;
+mod choices;
 mod cloud;
 mod creases;
 mod depth_change;
@@ -19,10 +20,12 @@ mod summed_area;
 mod surroundings;
 
 pub(crate) use blocks::{BLOCK, Blocks};
+pub(crate) use choices::{
+    CREASE_COST, CREASE_NOISE, EXACT_SHARE, EvenWindows, MISFIT, NEAR, NEAR_NOISE, REACH,
+};
 pub(crate) use cloud::{CleanPoints, Cleaned, Cloud};
 pub(crate) use even_windows::{
-    Asked, CHANCE, CREASE_COST, CREASE_NOISE, EXACT_SHARE, EvenWindow, EvenWindows, JAGGED,
-    JAGGED_POINTS, JAGGED_RADIUS, MISFIT, NEAR, NEAR_NOISE, PLACES, REACH, even_windows,
+    Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, PLACES, even_windows,
 };
 pub(crate) use methods::estimate as plain_estimate;
 pub(crate) use planes::{JITTER, Plane, inverse_depth};

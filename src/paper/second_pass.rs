@@ -3,9 +3,10 @@
 use std::iter::repeat_n;
 
 use super::blocks::Blocks;
+use super::choices::EvenWindows;
 use super::cloud::Cloud;
 use super::creases::SummedNormals;
-use super::even_windows::{Asked, EvenWindow, EvenWindows};
+use super::even_windows::{Asked, EvenWindow};
 use super::rect::Rect;
 use super::{
     depth_changes, is_depth_change, rect_around, refill, smoothing_area, surroundings, window,

@@ -1,4 +1,4 @@
-//! Which even window each pixel takes, fast, for one row of blocks: the plain form is in `paper::even_windows`. The
+//! Which even window each pixel takes, fast, for one row of blocks: the plain form is in `paper::choices`. The
 //! windows at one place of as many blocks as there are lanes are gathered together, and weighed for a pixel of each at a
 //! time.
 
@@ -27,7 +27,7 @@ pub(super) unsafe fn row<S: Groups>(even: &EvenWindows, row: usize, choices: &mu
         let group = Group { even, row, first, count: (across - first).min(lanes) };
         // SAFETY: as the caller's.
         unsafe {
-            group.candidates::<S>(&mut found);
+            group.candidates::<S::Widest, S>(&mut found);
             if found.number > 0 {
                 found.weigh(even.asked.least_noise);
                 for (y, choices) in choices.chunks_mut(even.cloud.width).enumerate() {
@@ -53,8 +53,8 @@ struct Group<'a> {
 struct Lines<S: Simd> {
     /// The number of the first block in the row, or that of the column.
     first: [usize; LANES],
-    /// The ways in pixels to the blocks' own.
-    to_own: Floats<S>,
+    /// The ways in pixels from the blocks' own.
+    from_own: Floats<S>,
 }
 
 /// Windows that the pixels of a group may take, one each.
@@ -65,8 +65,8 @@ struct Candidates<S: Simd> {
     windows: [Lanes; FIELDS],
     /// The mask of the blocks that may take theirs.
     may_take: S::F,
-    /// The ways from the windows' pixels to the blocks' first.
-    to_first: [Floats<S>; 2],
+    /// Where the windows' middles are, from the blocks' first pixels.
+    middles: [Floats<S>; 2],
     radius: Floats<S>,
     planes: Inclined<S>,
     per_bend: Floats<S>,
@@ -138,7 +138,7 @@ impl<S: Simd> Candidates<S> {
             places: [0; LANES],
             windows: [Lanes::ZERO; FIELDS],
             may_take: zero.0,
-            to_first: [zero; 2],
+            middles: [zero; 2],
             radius: zero,
             planes: Inclined { at_first: zero, slope: [zero; 2] },
             per_bend: zero,
@@ -148,13 +148,15 @@ impl<S: Simd> Candidates<S> {
         }
     }
 
+    /// The fields of the windows.
+    ///
     /// # Safety
-    /// The processor has the instruction set of `S`; there is such a field.
+    /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn field(&self, field: usize) -> Floats<S> {
-        debug_assert!(field < FIELDS);
+    unsafe fn fields(&self) -> [Floats<S>; FIELDS] {
+        let from = self.windows.as_ptr().cast::<f32>();
         // SAFETY: as the caller's; there is room for fields of `LANES`.
-        unsafe { Floats::load(self.windows.as_ptr().cast::<f32>().add(field * S::LANES)) }
+        std::array::from_fn(|field| unsafe { Floats::load(from.add(field * S::LANES)) })
     }
 }
 
@@ -196,7 +198,7 @@ impl<S: Simd> Found<S> {
             to.places[lane] = place(lane) as u32;
         }
         to.may_take = may_take;
-        to.to_first = [columns.to_own, rows.to_own];
+        to.middles = [columns.from_own, rows.from_own];
         for group in (0..S::LANES).step_by(GROUP) {
             let to = to.windows.as_mut_ptr().cast::<f32>().wrapping_add(group);
             // SAFETY: as the caller's; a window is eight floats.
@@ -229,14 +231,13 @@ impl<S: Simd> Found<S> {
             let least_noise = Floats::<S>::splat(least_noise);
             let (mut least, mut there, mut exact) = (Floats::splat(f32::INFINITY), zero, zero);
             for to in &mut self.candidates[..self.number] {
-                let [radius, inverse_depth, across, down, _, noise, _, per_bend] =
-                    std::array::from_fn(|field| to.field(field));
-                let [dx, dy] = to.to_first;
+                let [radius, inverse_depth, across, down, _, noise, _, per_bend] = to.fields();
+                let [dx, dy] = to.middles;
                 let is_near =
                     S::lt(dx.abs().max(dy.abs()).0, (radius + Floats::splat(REACH + 1.0)).0);
                 to.may_take = S::and(to.may_take, S::and(is_near, S::lt(zero.0, radius.0)));
                 to.radius = radius;
-                let at_first = inverse_depth + across * dx + down * dy;
+                let at_first = inverse_depth - across * dx - down * dy;
                 to.planes = Inclined { at_first, slope: [across, down] };
                 let steepness_squared = across * across + down * down;
                 to.jitter = Floats::splat(JITTER) * steepness_squared.sqrt();
@@ -253,7 +254,7 @@ impl<S: Simd> Found<S> {
             self.exact = S::lt((Floats::splat(EXACT_SHARE) * there).0, exact.0);
             self.noise = least.max(least_noise);
             for to in &mut self.candidates[..self.number] {
-                let (unevenness, per_noise) = (to.field(4), to.field(6));
+                let [_, _, _, _, unevenness, _, per_noise, _] = to.fields();
                 let misfit = (unevenness - self.noise).max(zero);
                 let even = self.noise * per_noise + Floats::splat(MISFIT) * misfit * to.per_bend;
                 to.even = Floats(S::select(to.may_take, even.0, S::splat(f32::INFINITY)));
@@ -268,7 +269,7 @@ impl Group<'_> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn candidates<G: Groups>(&self, found: &mut Found<G::Widest>) {
+    unsafe fn candidates<S: Simd, G: Groups<Widest = S>>(&self, found: &mut Found<S>) {
         let &Group { even, row, first, count } = self;
         let Blocks { across, down, .. } = even.asked.blocks;
         let own = row * across + first;
@@ -283,34 +284,31 @@ impl Group<'_> {
         found.number = 0;
         // SAFETY: as the caller's; all places are inside the image.
         unsafe {
-            let zero = Floats::<G::Widest>::splat(0.0);
-            let levels = levels.load::<G::Widest>();
-            let mut radii = Floats::<G::Widest>(radii.load::<G::Widest>());
+            let zero = Floats::<S>::splat(0.0);
+            let levels = levels.load::<S>();
+            let mut radii = Floats::<S>(radii.load::<S>());
             let mut level = 0.0;
-            let takes_any = <G::Widest as Simd>::lt(zero.0, levels);
-            if <G::Widest as Simd>::bits(takes_any) == 0 {
+            let takes_any = S::lt(zero.0, levels);
+            if S::bits(takes_any) == 0 {
                 return;
             }
             // Lanes outside the image stand for the last block of the row.
-            let last = Floats::<G::Widest>::splat((across - 1) as f32);
+            let last = Floats::<S>::splat((across - 1) as f32);
             let column = std::array::from_fn(|lane| (first + lane) as f32);
-            let column = Floats::<G::Widest>(Lanes(column).load::<G::Widest>());
-            let column = Floats::<G::Widest>(<G::Widest as Simd>::min(column.0, last.0));
-            let row = Floats::<G::Widest>::splat(row as f32);
-            let own = [lines::<G::Widest>(column, column, 1), lines(row, row, across)];
+            let column = Floats::<S>(Lanes(column).load::<S>());
+            let column = Floats::<S>(S::min(column.0, last.0));
+            let row = Floats::<S>::splat(row as f32);
+            let own = [lines::<S>(column, column, 1), lines(row, row, across)];
             found.add::<G>(even.windows, &own[0], &own[1], takes_any);
             loop {
-                let may_take = <G::Widest as Simd>::and(
-                    <G::Widest as Simd>::lt(zero.0, radii.0),
-                    <G::Widest as Simd>::lt(<G::Widest as Simd>::splat(level), levels),
-                );
-                if <G::Widest as Simd>::bits(may_take) == 0 {
+                let may_take = S::and(S::lt(zero.0, radii.0), S::lt(S::splat(level), levels));
+                if S::bits(may_take) == 0 {
                     break;
                 }
                 // Rounded up.
                 let distance =
                     (radii + Floats::splat(BLOCK as f32 - 1.0)) / Floats::splat(BLOCK as f32);
-                let distance = Floats(<G::Widest as Simd>::truncate(distance.0));
+                let distance = Floats(S::truncate(distance.0));
                 let [left, right] = around(column, distance, across, 1);
                 let [above, below] = around(row, distance, down, across);
                 let columns = [&left, &own[0], &right];
@@ -318,7 +316,7 @@ impl Group<'_> {
                 for (column, row) in PLACES {
                     found.add::<G>(even.windows, columns[column], rows[row], may_take);
                 }
-                radii = Floats(<G::Widest as Simd>::truncate((radii * Floats::splat(0.5)).0));
+                radii = Floats(S::truncate((radii * Floats::splat(0.5)).0));
                 level += 1.0;
             }
         }
@@ -367,8 +365,8 @@ impl Group<'_> {
                 let astray = near.inverse_depth - candidates.planes.at(at_near);
                 let astray = (astray * astray - near_noise).max(zero);
                 let per_astray = Floats::splat(NEAR) * candidates.per_bend;
-                let [dx, dy] = candidates.to_first;
-                let distance = (dx + column).abs().max((dy + row).abs());
+                let [dx, dy] = candidates.middles;
+                let distance = (column - dx).abs().max((row - dy).abs());
                 let short = (distance - candidates.radius).max(zero);
                 let cost = (candidates.even + astray * per_astray) * (one + short * short);
                 let off = (near.own - candidates.planes.at([column, row])).abs();
@@ -379,16 +377,15 @@ impl Group<'_> {
                 least.0 = S::select(better, cost.0, least.0);
                 best = S::select(better, S::splat(number as f32), best);
                 planes.replace(better, &candidates.planes);
-                middle[0].0 = S::select(better, (zero - dx).0, middle[0].0);
-                middle[1].0 = S::select(better, (zero - dy).0, middle[1].0);
+                middle[0].0 = S::select(better, dx.0, middle[0].0);
+                middle[1].0 = S::select(better, dy.0, middle[1].0);
             }
             // By chance the pixel may be nearer to the plane beyond a crease.
             least = Floats::splat(CREASE_COST) * least;
             for (number, candidates) in found.iter().enumerate() {
                 let is_better = S::lt(candidates.cost.0, least.0);
                 let gap = candidates.planes.minus(&planes);
-                let [dx, dy] = candidates.to_first;
-                let (here, there) = (gap.at([zero - dx, zero - dy]), gap.at(middle));
+                let (here, there) = (gap.at(candidates.middles), gap.at(middle));
                 let least_gap = Floats::<S>(S::min(here.abs().0, there.abs().0));
                 let are_two = S::lt(crease_noise.0, (least_gap * least_gap).0);
                 let is_crease = S::and(are_two, S::lt((here * there).0, zero.0));
@@ -407,7 +404,7 @@ impl Group<'_> {
     }
 }
 
-/// The columns or rows `at`, which lie `number` blocks apart, on the way to those of the blocks.
+/// The columns or rows `at`, which lie `number` blocks apart, for blocks in their `own`.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
@@ -415,11 +412,11 @@ impl Group<'_> {
 unsafe fn lines<S: Simd>(own: Floats<S>, at: Floats<S>, number: usize) -> Lines<S> {
     let mut first = [0; LANES];
     // SAFETY: as the caller's.
-    let to_own = unsafe {
+    let from_own = unsafe {
         S::store_i(first.as_mut_ptr(), S::truncate_i(at.0));
-        (own - at) * Floats::splat(BLOCK as f32)
+        (at - own) * Floats::splat(BLOCK as f32)
     };
-    Lines { first: first.map(|line| line as usize * number), to_own }
+    Lines { first: first.map(|line| line as usize * number), from_own }
 }
 
 /// The columns or rows, of so many, at distances before and behind the blocks' own.
