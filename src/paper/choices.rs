@@ -18,8 +18,8 @@ pub(crate) const NEAR_NOISE: f32 = 4.0;
 /// How many pixels beyond its window's edge a plane may be taken for a pixel's: outlines are ragged.
 pub(crate) const REACH: f32 = 3.0;
 /// Planes whose inverse depths at the middle of either's window differ by more than these many variances of the noise
-/// are two surfaces. The one beyond a crease is not taken if the pixel lies on this side of it, unless this side's costs
-/// `CREASE_COST` times as much.
+/// are two surfaces. The one beyond a crease is not taken if the pixel lies on this side of it, unless this side's
+/// costs `CREASE_COST` times as much.
 pub(crate) const CREASE_NOISE: f32 = 16.0;
 pub(crate) const CREASE_COST: f32 = 10.0;
 /// Depths are exact if more than this share of the windows that a pixel can take says so.
@@ -89,9 +89,10 @@ impl EvenWindows<'_> {
         let (point, tolerance) = (inverse_depth(cloud.depths[own]), self.tolerance(own));
         let candidate = |place: usize| {
             let window = &self.windows[place];
-            let [dx, dy] = way(blocks.first(place), first);
+            let middle = way(first, blocks.first(place));
+            let [dx, dy] = middle;
             let [across, down] = window.slope;
-            let at_first = window.inverse_depth + across * dx + down * dy;
+            let at_first = window.inverse_depth - across * dx - down * dy;
             let misfit = (window.unevenness - noise).max(0.0);
             let even = noise * window.per_noise + MISFIT * misfit * window.per_bend;
             let per_astray = NEAR * window.per_bend;
@@ -101,10 +102,9 @@ impl EvenWindows<'_> {
             let at_near = plane.at([x + near.offset[0], y + near.offset[1]]);
             let astray = near.inverse_depth - at_near;
             let astray = (astray * astray - NEAR_NOISE * noise / near.points).max(0.0);
-            let short = (distance([dx + x, dy + y]) - window.radius).max(0.0);
+            let short = (distance([x - dx, y - dy]) - window.radius).max(0.0);
             let cost = (even + astray * per_astray) * (1.0 + short * short);
             let lies_in = || (point - plane.at([x, y])).abs() < tolerance + jitter;
-            let middle = [-dx, -dy];
             (short == 0.0 || lies_in()).then_some(Candidate { place, plane, middle, cost })
         };
         let candidates: Vec<Candidate> = found.into_iter().filter_map(candidate).collect();

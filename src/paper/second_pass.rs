@@ -135,8 +135,8 @@ impl SecondPass {
             for at in pixels {
                 let size = wanted_size(cloud, options, at);
                 largest = size.max(largest);
-                let has_none = estimates[at][0].is_nan() && !cloud.is_missing(at);
-                if options.one_sided_windows && (sizes[at] < size || has_none) {
+                let has_none = || estimates[at][0].is_nan() && !cloud.is_missing(at);
+                if options.one_sided_windows && (sizes[at] < size || has_none()) {
                     concerned[at] = true;
                     level = EVERY_LEVEL;
                 } else if is_near_crease && has_window(at) {

@@ -465,7 +465,7 @@ impl Neighbours {
     /// the mask `noisy`, of these alone.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`; the blocks are inside the image but for those that make up the lanes.
+    /// The processor has the instruction set of `S`; the blocks are inside the image but for those that fill the lanes.
     #[inline(always)]
     unsafe fn near<S: Simd>(
         &self,
