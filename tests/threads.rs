@@ -252,17 +252,18 @@ fn assert_writes_nothing(estimator: &mut Estimator, cloud: &Cloud, error: Error)
     assert!(found.as_flattened().iter().all(|c| *c == 7.0), "partial output");
 }
 
-/// Runs this test once more, in a process with little address space, where few threads' stacks fit.
+/// Runs this test once more, in a process where stacks are large and two to three of them take the address space:
+/// what is left beside them is more than all else that a thread asks for, or the thread would abort.
 #[cfg(target_os = "linux")]
 #[test]
 fn threads_that_cannot_start_are_an_error() {
     const LIMITED: &str = "IINE_TEST_LIMITED";
     if std::env::var_os(LIMITED).is_none() {
         let output = Command::new("sh")
-            .args(["-c", "ulimit -v 400000 && exec \"$0\" \"$@\""])
+            .args(["-c", "ulimit -v 1000000 && exec \"$0\" \"$@\""])
             .arg(std::env::current_exe().unwrap())
             .args(["--exact", "threads_that_cannot_start_are_an_error", "--test-threads=1"])
-            .env(LIMITED, "1")
+            .envs([(LIMITED, "1"), ("RUST_MIN_STACK", "300000000"), ("MALLOC_ARENA_MAX", "1")])
             .output()
             .unwrap();
         let said = String::from_utf8_lossy(&output.stdout);
