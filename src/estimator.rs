@@ -419,7 +419,7 @@ impl paper::Engine for Engine<'_> {
         estimates: &mut Vec<[f32; 4]>,
     ) -> Result<(), Error> {
         if self.is_plain {
-            let pixels = (0..blocks.count()).map(|block| blocks.first(block));
+            let pixels = (0..blocks.count()).map(|block| blocks.middle(block));
             let radius = |(x, y)| radii[blocks.block(y * self.points.width() + x)];
             self.plain(pixels, estimates, |pixel| self.of_radius(pixel, radius(pixel)));
             return Ok(());

@@ -1,7 +1,10 @@
 //! Blocks of pixels, as the second pass looks at them: what is best for one pixel is next to best for its neighbours.
 
 /// Columns and rows of a block.
-pub(crate) const BLOCK: usize = 2;
+pub(crate) const BLOCK: usize = 3;
+
+/// Columns and rows before a block's middle pixel.
+pub(crate) const MIDDLE: usize = BLOCK / 2;
 
 /// An image's blocks, row by row; those at its right and lower edges may be cut.
 #[derive(Clone, Copy, Debug)]
@@ -22,9 +25,10 @@ impl Blocks {
         self.across * self.down
     }
 
-    /// Column and row of a block's first pixel.
-    pub fn first(&self, block: usize) -> (usize, usize) {
-        (block % self.across * BLOCK, block / self.across * BLOCK)
+    /// Column and row of a block's middle pixel; where that is cut off, of the last one inside the image.
+    pub fn middle(&self, block: usize) -> (usize, usize) {
+        let [x, y] = [block % self.across, block / self.across].map(|at| at * BLOCK + MIDDLE);
+        (x.min(self.width - 1), y.min(self.height - 1))
     }
 
     /// The numbers of a block's pixels; the last ones inside the image stand for those that are cut off.

@@ -3,6 +3,7 @@
 //! points that do not lie in the window's plane, or a pixel that does not, bend it by some share of their deviation over
 //! L. And beside a crease, the one on the pixel's side.
 
+use super::blocks::{BLOCK, MIDDLE};
 use super::cloud::Cloud;
 use super::even_windows::{Asked, EvenWindow};
 use super::planes::{JITTER, inverse_depth};
@@ -16,7 +17,7 @@ pub(crate) const MISFIT: f32 = 3.0;
 pub(crate) const NEAR: f32 = 9.0;
 pub(crate) const NEAR_NOISE: f32 = 4.0;
 /// How many pixels beyond its window's edge a plane may be taken for a pixel's: outlines are ragged.
-pub(crate) const REACH: f32 = 3.0;
+pub(crate) const REACH: f32 = 4.0;
 /// Planes whose inverse depths at the middle of either's window differ by more than these many variances of the noise
 /// are two surfaces. The one beyond a crease is not taken if the pixel lies on this side of it, unless this side's
 /// costs `CREASE_COST` times as much.
@@ -64,17 +65,18 @@ impl EvenWindows<'_> {
     fn best(&self, own: usize) -> Option<u32> {
         let cloud = self.cloud;
         let blocks = &self.asked.blocks;
-        let way = |from: (usize, usize), to: (usize, usize)| {
-            [to.0 as f32 - from.0 as f32, to.1 as f32 - from.1 as f32]
-        };
         let distance = |[dx, dy]: [f32; 2]| dx.abs().max(dy.abs());
         let block = blocks.block(own);
-        let first = blocks.first(block);
+        let [column, row] = [block % blocks.across, block / blocks.across];
+        let way = |(x, y): (usize, usize)| {
+            let from = |at: usize, line: usize| at as f32 - (line * BLOCK + MIDDLE) as f32;
+            [from(x, column), from(y, row)]
+        };
         let (mut noise, mut exact) = (f32::INFINITY, 0.0);
         let mut found = Vec::new();
         self.asked.for_each_place(block, |place| {
             let window = &self.windows[place];
-            let distance = distance(way(blocks.first(place), first));
+            let distance = distance(way(blocks.middle(place)));
             if window.radius > 0.0 && distance <= window.radius + REACH {
                 noise = noise.min(window.noise);
                 exact += f32::from(window.is_exact(self.asked.least_noise));
@@ -85,20 +87,20 @@ impl EvenWindows<'_> {
         let noise = noise.max(self.asked.least_noise);
         let pixel = (own % cloud.width, own / cloud.width);
         let near = self.near(pixel, exact > EXACT_SHARE * found.len() as f32);
-        let [x, y] = way(first, pixel);
+        let [x, y] = way(pixel);
         let (point, tolerance) = (inverse_depth(cloud.depths[own]), self.tolerance(own));
         let candidate = |place: usize| {
             let window = &self.windows[place];
-            let middle = way(first, blocks.first(place));
+            let middle = way(blocks.middle(place));
             let [dx, dy] = middle;
             let [across, down] = window.slope;
-            let at_first = window.inverse_depth - across * dx - down * dy;
+            let at_middle = window.inverse_depth - across * dx - down * dy;
             let misfit = (window.unevenness - noise).max(0.0);
             let even = noise * window.per_noise + MISFIT * misfit * window.per_bend;
             let per_astray = NEAR * window.per_bend;
             let jitter = JITTER * (across * across + down * down).sqrt();
 
-            let plane = Inclined { at_first, slope: window.slope };
+            let plane = Inclined { at_middle, slope: window.slope };
             let at_near = plane.at([x + near.offset[0], y + near.offset[1]]);
             let astray = near.inverse_depth - at_near;
             let astray = (astray * astray - NEAR_NOISE * noise / near.points).max(0.0);
@@ -154,7 +156,7 @@ impl EvenWindows<'_> {
     }
 }
 
-/// A window that a pixel can take, and what it costs. Places are in pixels from the first of the pixel's block.
+/// A window that a pixel can take, and what it costs. Places are in pixels from the middle of the pixel's block.
 struct Candidate {
     place: usize,
     plane: Inclined,
@@ -174,21 +176,21 @@ impl Candidate {
     }
 }
 
-/// A plane by its inverse depth at the first pixel of a block, and its change per pixel to the right and down.
+/// A plane by its inverse depth at the middle pixel of a block, and its change per pixel to the right and down.
 struct Inclined {
-    at_first: f32,
+    at_middle: f32,
     slope: [f32; 2],
 }
 
 impl Inclined {
     fn at(&self, [x, y]: [f32; 2]) -> f32 {
-        self.at_first + self.slope[0] * x + self.slope[1] * y
+        self.at_middle + self.slope[0] * x + self.slope[1] * y
     }
 
     /// How far its inverse depths are above another's.
     fn minus(&self, other: &Inclined) -> Inclined {
         let slope = std::array::from_fn(|i| self.slope[i] - other.slope[i]);
-        Inclined { at_first: self.at_first - other.at_first, slope }
+        Inclined { at_middle: self.at_middle - other.at_middle, slope }
     }
 }
 

@@ -1,4 +1,4 @@
-//! Even windows: around every block's first pixel the largest window whose points lie in one plane as well as chance
+//! Even windows: around every block's middle pixel the largest window whose points lie in one plane as well as chance
 //! allows.
 //!
 //! A pixel beside a depth change or a crease is in the middle of no large window that lies on one surface, but it is
@@ -123,7 +123,7 @@ pub(crate) fn even_windows<'a>(
 }
 
 fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<EvenWindow> {
-    let pixel = asked.blocks.first(block);
+    let pixel = asked.blocks.middle(block);
     let (wanted, clean) = (asked.wanted[block], asked.clean[cloud.index(pixel.0, pixel.1)]);
     let rect = |radius: u32| Rect::around(pixel, radius as usize, (cloud.width, cloud.height));
     let plane = |radius: u32| Plane::of(cloud, &rect(radius));

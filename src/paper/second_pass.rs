@@ -1,6 +1,6 @@
 //! The second pass: normals near depth changes and near creases, from even windows.
 
-use std::iter::repeat_n;
+use std::iter::{once, repeat_n};
 
 use super::blocks::Blocks;
 use super::choices::EvenWindows;
@@ -35,7 +35,7 @@ pub(crate) trait Engine {
     /// The block whose window each pixel takes, if there is one.
     fn choices(&mut self, even: &EvenWindows, choices: &mut Vec<Option<u32>>) -> Result<(), Error>;
 
-    /// The estimates of windows around blocks' first pixels, for the blocks that have one, by their radii.
+    /// The estimates of windows around blocks' middle pixels, for the blocks that have one, by their radii.
     fn of_blocks(
         &mut self,
         blocks: &Blocks,
@@ -127,10 +127,11 @@ impl SecondPass {
         let places = (0..blocks.down).flat_map(|row| (0..blocks.across).map(move |x| (x, row)));
         for pixels in places.map(|place| blocks.pixels(place)) {
             let has_window = |at: usize| sizes[at] > 0 && !cloud.is_missing(at);
-            let first = || pixels.iter().find(|at| has_window(**at));
+            let middle = pixels[pixels.len() / 2];
+            let inner = || once(middle).chain(pixels).find(|at| has_window(*at));
             let normals_vary =
-                |at: &usize| normals.vary_in(&window_of_size(cloud, options, *at, sizes[*at]));
-            let is_near_crease = options.crease_windows && first().is_some_and(normals_vary);
+                |at: usize| normals.vary_in(&window_of_size(cloud, options, at, sizes[at]));
+            let is_near_crease = options.crease_windows && inner().is_some_and(normals_vary);
             let (mut largest, mut level) = (0, 0);
             for at in pixels {
                 let size = wanted_size(cloud, options, at);

@@ -7,7 +7,7 @@ use crate::fast::lanes::{LANES, Lanes};
 use crate::fast::tile::Bits;
 use crate::paper::{
     BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows, JITTER,
-    MISFIT, NEAR, NEAR_NOISE, PLACES, REACH, inverse_depth,
+    MIDDLE, MISFIT, NEAR, NEAR_NOISE, PLACES, REACH, inverse_depth,
 };
 use crate::simd::{GROUP, Groups, Simd};
 
@@ -65,7 +65,7 @@ struct Candidates<S: Simd> {
     windows: [Lanes; FIELDS],
     /// The mask of the blocks that may take theirs.
     may_take: S::F,
-    /// Where the windows' middles are, from the blocks' first pixels.
+    /// Where the windows' middles are, from the blocks' middle pixels.
     middles: [Floats<S>; 2],
     radius: Floats<S>,
     planes: Inclined<S>,
@@ -81,18 +81,18 @@ struct Candidates<S: Simd> {
 /// The fields of an [`EvenWindow`].
 const FIELDS: usize = size_of::<EvenWindow>() / size_of::<f32>();
 
-/// Planes by their inverse depths at the blocks' first pixels, and their changes per pixel to the right and down.
+/// Planes by their inverse depths at the blocks' middle pixels, and their changes per pixel to the right and down.
 #[derive(Clone, Copy)]
 struct Inclined<S: Simd> {
-    at_first: Floats<S>,
+    at_middle: Floats<S>,
     slope: [Floats<S>; 2],
 }
 
 impl<S: Simd> Inclined<S> {
-    /// The inverse depths so far from the blocks' first pixels.
+    /// The inverse depths so far from the blocks' middle pixels.
     #[inline(always)]
     fn at(&self, [x, y]: [Floats<S>; 2]) -> Floats<S> {
-        self.at_first + self.slope[0] * x + self.slope[1] * y
+        self.at_middle + self.slope[0] * x + self.slope[1] * y
     }
 
     /// How far the inverse depths are above the others'.
@@ -100,7 +100,7 @@ impl<S: Simd> Inclined<S> {
     fn minus(&self, other: &Inclined<S>) -> Inclined<S> {
         let [across, down] = self.slope;
         let slope = [across - other.slope[0], down - other.slope[1]];
-        Inclined { at_first: self.at_first - other.at_first, slope }
+        Inclined { at_middle: self.at_middle - other.at_middle, slope }
     }
 
     /// Takes the others of a mask.
@@ -111,7 +111,7 @@ impl<S: Simd> Inclined<S> {
     unsafe fn replace(&mut self, mask: S::F, other: &Inclined<S>) {
         // SAFETY: as the caller's.
         unsafe {
-            self.at_first.0 = S::select(mask, other.at_first.0, self.at_first.0);
+            self.at_middle.0 = S::select(mask, other.at_middle.0, self.at_middle.0);
             for (own, other) in self.slope.iter_mut().zip(other.slope) {
                 own.0 = S::select(mask, other.0, own.0);
             }
@@ -140,7 +140,7 @@ impl<S: Simd> Candidates<S> {
             may_take: zero.0,
             middles: [zero; 2],
             radius: zero,
-            planes: Inclined { at_first: zero, slope: [zero; 2] },
+            planes: Inclined { at_middle: zero, slope: [zero; 2] },
             per_bend: zero,
             even: zero,
             jitter: zero,
@@ -237,8 +237,8 @@ impl<S: Simd> Found<S> {
                     S::lt(dx.abs().max(dy.abs()).0, (radius + Floats::splat(REACH + 1.0)).0);
                 to.may_take = S::and(to.may_take, S::and(is_near, S::lt(zero.0, radius.0)));
                 to.radius = radius;
-                let at_first = inverse_depth - across * dx - down * dy;
-                to.planes = Inclined { at_first, slope: [across, down] };
+                let at_middle = inverse_depth - across * dx - down * dy;
+                to.planes = Inclined { at_middle, slope: [across, down] };
                 let steepness_squared = across * across + down * down;
                 to.jitter = Floats::splat(JITTER) * steepness_squared.sqrt();
                 to.per_bend = per_bend;
@@ -272,6 +272,7 @@ impl Group<'_> {
     unsafe fn candidates<S: Simd, G: Groups<Widest = S>>(&self, found: &mut Found<S>) {
         let &Group { even, row, first, count } = self;
         let Blocks { across, down, .. } = even.asked.blocks;
+        let &Cloud { width, height, .. } = even.cloud;
         let own = row * across + first;
         let (mut levels, mut radii) = (Lanes::ZERO, Lanes::ZERO);
         for lane in 0..count {
@@ -298,7 +299,9 @@ impl Group<'_> {
             let column = Floats::<S>(Lanes(column).load::<S>());
             let column = Floats::<S>(S::min(column.0, last.0));
             let row = Floats::<S>::splat(row as f32);
-            let own = [lines::<S>(column, column, 1), lines(row, row, across)];
+            let columns = Axis { pixels: width, blocks: across, number: 1 };
+            let rows = Axis { pixels: height, blocks: down, number: across };
+            let own = [columns.lines::<S>(column, column), rows.lines(row, row)];
             found.add::<G>(even.windows, &own[0], &own[1], takes_any);
             loop {
                 let may_take = S::and(S::lt(zero.0, radii.0), S::lt(S::splat(level), levels));
@@ -309,12 +312,12 @@ impl Group<'_> {
                 let distance =
                     (radii + Floats::splat(BLOCK as f32 - 1.0)) / Floats::splat(BLOCK as f32);
                 let distance = Floats(S::truncate(distance.0));
-                let [left, right] = around(column, distance, across, 1);
-                let [above, below] = around(row, distance, down, across);
-                let columns = [&left, &own[0], &right];
-                let rows = [&above, &own[1], &below];
+                let [left, right] = columns.around(column, distance);
+                let [above, below] = rows.around(row, distance);
+                let across = [&left, &own[0], &right];
+                let down = [&above, &own[1], &below];
                 for (column, row) in PLACES {
-                    found.add::<G>(even.windows, columns[column], rows[row], may_take);
+                    found.add::<G>(even.windows, across[column], down[row], may_take);
                 }
                 radii = Floats(S::truncate((radii * Floats::splat(0.5)).0));
                 level += 1.0;
@@ -351,14 +354,14 @@ impl Group<'_> {
             let noisy = S::and_not(found.exact, S::lt(S::splat(0.0), clean.load::<S>()));
             let near = neighbours.near::<S>(self.first, [column, row], noisy);
             let (zero, one) = (Floats::splat(0.0), Floats::splat(1.0));
-            let [column, row] = [column, row].map(|at| Floats::splat(at as f32));
+            let [column, row] = [column, row].map(|at| Floats::splat(at as f32 - MIDDLE as f32));
             let tolerance = Floats(tolerances.load::<S>());
             let near_noise = Floats::splat(NEAR_NOISE) * found.noise / near.points;
             let at_near = [column + near.offset[0], row + near.offset[1]];
             let crease_noise = Floats::splat(CREASE_NOISE) * found.noise;
             let mut least = Floats::<S>::splat(f32::INFINITY);
             let mut best = S::splat(-1.0);
-            let mut planes = Inclined { at_first: zero, slope: [zero; 2] };
+            let mut planes = Inclined { at_middle: zero, slope: [zero; 2] };
             let mut middle = [zero; 2];
             let found = &mut found.candidates[..found.number];
             for (number, candidates) in found.iter_mut().enumerate() {
@@ -404,37 +407,45 @@ impl Group<'_> {
     }
 }
 
-/// The columns or rows `at`, which lie `number` blocks apart, for blocks in their `own`.
-///
-/// # Safety
-/// The processor has the instruction set of `S`.
-#[inline(always)]
-unsafe fn lines<S: Simd>(own: Floats<S>, at: Floats<S>, number: usize) -> Lines<S> {
-    let mut first = [0; LANES];
-    // SAFETY: as the caller's.
-    let from_own = unsafe {
-        S::store_i(first.as_mut_ptr(), S::truncate_i(at.0));
-        (at - own) * Floats::splat(BLOCK as f32)
-    };
-    Lines { first: first.map(|line| line as usize * number), from_own }
+/// The columns or the rows of the image.
+struct Axis {
+    pixels: usize,
+    blocks: usize,
+    /// From a block to the next.
+    number: usize,
 }
 
-/// The columns or rows, of so many, at distances before and behind the blocks' own.
-///
-/// # Safety
-/// The processor has the instruction set of `S`.
-#[inline(always)]
-unsafe fn around<S: Simd>(
-    own: Floats<S>,
-    distance: Floats<S>,
-    count: usize,
-    number: usize,
-) -> [Lines<S>; 2] {
-    // SAFETY: as the caller's.
-    unsafe {
-        let before = Floats(S::max((own - distance).0, S::splat(0.0)));
-        let behind = Floats(S::min((own + distance).0, S::splat((count - 1) as f32)));
-        [lines(own, before, number), lines(own, behind, number)]
+impl Axis {
+    /// The lines `at` of blocks, for blocks in their `own`.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn lines<S: Simd>(&self, own: Floats<S>, at: Floats<S>) -> Lines<S> {
+        let mut first = [0; LANES];
+        // SAFETY: as the caller's.
+        let from_own = unsafe {
+            S::store_i(first.as_mut_ptr(), S::truncate_i(at.0));
+            let middle =
+                |line: Floats<S>| line * Floats::splat(BLOCK as f32) + Floats::splat(MIDDLE as f32);
+            Floats(S::min(middle(at).0, S::splat((self.pixels - 1) as f32))) - middle(own)
+        };
+        Lines { first: first.map(|line| line as usize * self.number), from_own }
+    }
+
+    /// The lines at distances before and behind the blocks' own.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn around<S: Simd>(&self, own: Floats<S>, distance: Floats<S>) -> [Lines<S>; 2] {
+        // SAFETY: as the caller's.
+        unsafe {
+            let last = S::splat((self.blocks - 1) as f32);
+            let before = Floats(S::max((own - distance).0, S::splat(0.0)));
+            let behind = Floats(S::min((own + distance).0, last));
+            [self.lines(own, before), self.lines(own, behind)]
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use super::rects::{Place, Rects, STEPS, range};
 use crate::fast::Parts;
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::paper::{
-    Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, Plane,
+    Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, MIDDLE, Plane,
     inverse_depth,
 };
 use crate::simd::{GROUP, Groups};
@@ -107,7 +107,8 @@ impl EvenTile<'_> {
         rings.start(columns, top, rows_of_rings(reach, height));
         let mut next = top;
         for y in self.rows.clone().step_by(BLOCK) {
-            while next < (y + reach + 1).min(bottom) {
+            let middle = (y + MIDDLE).min(height - 1);
+            while next < (middle + reach + 1).min(bottom) {
                 rings.read_positions(&depths[next * width..], next);
                 rings.push(&moments, next);
                 next += 1;
@@ -115,9 +116,10 @@ impl EvenTile<'_> {
             for x in self.columns.clone().step_by(GROUP * BLOCK) {
                 let block = self.asked.blocks.block(y * width + x);
                 let blocks = block..block + (self.columns.end - x).div_ceil(BLOCK).min(GROUP);
+                let middle = (x + MIDDLE, middle);
                 // SAFETY: as the caller's.
                 unsafe {
-                    let found = self.eight::<S>(rings, &moments, (x, y), blocks.clone());
+                    let found = self.eight::<S>(rings, &moments, middle, blocks.clone());
                     found.write(windows.part(blocks));
                 }
             }
@@ -132,7 +134,7 @@ impl EvenTile<'_> {
         inverse.into_iter().find(|r| !r.is_nan()).unwrap_or(0.0)
     }
 
-    /// The windows of at most eight `blocks`, of which `pixel` is the first one's first.
+    /// The windows of at most eight `blocks`, of which `pixel` is the first one's middle, inside the image or not.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`; the rings hold what the windows need.
@@ -144,12 +146,13 @@ impl EvenTile<'_> {
         pixel: (usize, usize),
         blocks: Range<usize>,
     ) -> Fits<S> {
-        let first = self.cloud.index(pixel.0, pixel.1);
+        let &Cloud { width, .. } = self.cloud;
+        let clean_radii = &self.asked.clean[pixel.1 * width..][..width];
         let [mut wanted, mut clean, mut largest] = [[0.0; GROUP]; 3];
         for (lane, block) in blocks.enumerate() {
             if self.needed[block] {
                 wanted[lane] = self.asked.wanted[block] as f32;
-                clean[lane] = self.asked.clean[first + lane * BLOCK] as f32;
+                clean[lane] = clean_radii[(pixel.0 + lane * BLOCK).min(width - 1)] as f32;
                 largest[lane] = (self.asked.largest(block) as f32).min(clean[lane]);
             }
         }
@@ -227,7 +230,7 @@ impl EvenTile<'_> {
             let chance = Floats::splat(1.0) + Floats::splat(CHANCE) * chance.sqrt();
             let noise = unevenness * chance.widen();
             // The pixels' own positions.
-            let column = columns::<S>(x).widen();
+            let column = columns::<S>(x, self.cloud.width).widen();
             let [left, top, origin, _] = moments.origin.map(|o| Doubles::splat(o));
             let across = column - left - mx;
             let down = Doubles::splat(y as f64) - top - my;
@@ -255,7 +258,7 @@ impl EvenTile<'_> {
         unsafe {
             let row = Floats::splat(y as f32);
             let &Cloud { width, height, .. } = self.cloud;
-            let area = side(columns(x), radii, width) * side(row, radii, height);
+            let area = side(columns(x, width), radii, width) * side(row, radii, height);
             let limit = Doubles::splat(JAGGED * JAGGED) * (a * a + b * b);
             let fewest = Doubles::splat(JAGGED_POINTS) * area.widen();
             !limit.lt(fits.unevenness) & !fits.points.lt(fewest)
@@ -263,14 +266,17 @@ impl EvenTile<'_> {
     }
 }
 
-/// The columns of eight blocks' first pixels, from column `x` on.
+/// The columns of eight blocks' middle pixels, from column `x` on, in an image of this width.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn columns<S: Groups>(x: usize) -> Floats<S> {
+unsafe fn columns<S: Groups>(x: usize, width: usize) -> Floats<S> {
     // SAFETY: as the caller's.
-    unsafe { Floats::load(STEPS.as_ptr()) * Floats::splat(BLOCK as f32) + Floats::splat(x as f32) }
+    unsafe {
+        let steps = Floats::<S>::load(STEPS.as_ptr()) * Floats::splat(BLOCK as f32);
+        Floats(S::min((steps + Floats::splat(x as f32)).0, S::splat((width - 1) as f32)))
+    }
 }
 
 /// How many columns or rows, of so many, windows around `at` have.

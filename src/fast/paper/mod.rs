@@ -102,7 +102,7 @@ pub(crate) fn compute_with_radii(
     Ok(())
 }
 
-/// The normals of the blocks whose first pixel has a window of one of these radii; NaN for the others.
+/// The normals of the blocks whose middle pixel has a window of one of these radii; NaN for the others.
 pub(crate) fn compute_of_blocks(
     isa: Isa,
     points: &Points,
@@ -133,7 +133,7 @@ pub(crate) fn even_windows(
     windows.resize(blocks.count(), EvenWindow::default());
     let parts = Parts(windows.as_mut_ptr());
     let radius = |block: usize| {
-        let (x, y) = blocks.first(block);
+        let (x, y) = blocks.middle(block);
         asked.largest(block).min(asked.clean[cloud.index(x, y)]).max(asked.wanted[block])
     };
     let needed_blocks = (0..blocks.count()).filter(|block| needed[*block]);
@@ -296,7 +296,7 @@ impl<'a> Job<'a> {
         Ok(given.iter().max().map_or(0, |largest| *largest as usize))
     }
 
-    /// The normals of every `step`-th pixel of every `step`-th row, tile by tile; no window's radius is above `largest`.
+    /// The normals of the middle pixels of blocks of `step` x `step` pixels, tile by tile; no window's radius is above `largest`.
     #[inline(never)]
     fn tiles(
         &self,

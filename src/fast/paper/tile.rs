@@ -26,8 +26,7 @@ pub(crate) struct Tile<'a, F> {
     pub whole_points: bool,
     /// How far a window reaches from its pixel at most.
     pub largest: usize,
-    /// Pixels from one that gets a normal to the next, along rows and columns; the image's first pixel and the tile's
-    /// get one. At most `BLOCK`.
+    /// Columns and rows of the blocks whose middle pixels get the normals, at most `BLOCK`; the tile starts with one.
     pub step: usize,
     /// A row's depths, and the radii of its windows, 0 for none, if it has normals; both can be read up to a whole
     /// group.
@@ -55,7 +54,8 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         unsafe { rings.read::<S>(self.points, (self.row)(top).0, top, self.whole_points) };
         let mut next = top;
         for y in self.rows.clone().step_by(self.step) {
-            while next < (y + reach + 1).min(bottom) {
+            let (_, middle) = self.middle((0, y));
+            while next < (middle + reach + 1).min(bottom) {
                 if next + 1 < height {
                     let depths = (self.row)(next + 1).0;
                     // SAFETY: as the caller's.
@@ -70,6 +70,14 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
             // SAFETY: as the caller's.
             unsafe { self.row::<S, M, N>(rings, sink, &mut run, y, error) };
         }
+    }
+
+    /// The middle pixel of the block that starts at one; where that is cut off, the last one inside the image.
+    #[inline(always)]
+    fn middle(&self, (x, y): (usize, usize)) -> (usize, usize) {
+        let before = self.step / 2;
+        let (width, height) = (self.points.width(), self.points.height());
+        ((x + before).min(width - 1), (y + before).min(height - 1))
     }
 
     /// A point of the tile: sums about it lose less.
@@ -99,6 +107,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let (points, sums) = rings.parts();
         let radii = (self.row)(y).1;
         let step = self.step;
+        let (_, middle) = self.middle((0, y));
         let mut steps = [0; GROUP];
         for (lane, to) in steps.iter_mut().enumerate() {
             *to = (lane * step) as i32;
@@ -110,7 +119,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
             for (group, x) in (start..end).step_by(GROUP * step).enumerate() {
                 let at = group * GROUP;
                 let count = (end - x).div_ceil(step).min(GROUP);
-                let place = Place { image, x, y, step, left, stride, rows };
+                let place = Place { image, x: x + step / 2, y: middle, step, left, stride, rows };
                 // SAFETY: as the caller's; the rings hold what the windows of the tile's pixels need.
                 unsafe {
                     let eight = S::load(radii[x / step..].as_ptr());
@@ -124,7 +133,8 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                     let rects = Rects::new::<S, N>(&place, eight, M::INNER, M::ENDS);
                     let sums = rects.sums::<S, N>(sums);
                     M::note::<S>(&sums, &rects, points, windows, &mut run.sums, at);
-                    let [px, py, pz, _] = gather::<S>(rings.points_from(x, y), &steps);
+                    let [px, py, pz, _] =
+                        gather::<S>(rings.points_from(x + step / 2, middle), &steps);
                     run.points.store::<S>(at, [px, py, pz]);
                 }
             }
@@ -162,7 +172,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                     sink.write_none(x / step, y / step, count);
                     continue;
                 }
-                let pixel = |lane: usize| (x + lane * step, y);
+                let pixel = |lane: usize| self.middle((x + lane * step, y));
                 let rect = |lane: usize| {
                     window(pixel(lane), radii[x / step + lane] as usize, width, height)
                 };
