@@ -1,6 +1,6 @@
-//! Which even window each pixel takes, fast, for one row of blocks: the plain form is in `paper::choices`. The
-//! windows at one place of as many blocks as there are lanes are gathered together, and weighed for a pixel of each at a
-//! time.
+//! Which even window each pixel takes, fast, for one row of blocks: the plain form is in `paper::choices`. As many of the
+//! blocks concerned as there are lanes form a group: the windows at one place of each are gathered together, and weighed
+//! for a pixel of each at a time.
 
 use crate::fast::arithmetic::Floats;
 use crate::fast::lanes::{LANES, Lanes};
@@ -17,36 +17,37 @@ use crate::simd::{GROUP, Groups, Simd};
 /// The processor has the instruction set of `S`.
 #[inline(always)]
 pub(super) unsafe fn row<S: Groups>(even: &EvenWindows, row: usize, choices: &mut [Option<u32>]) {
-    let neighbours = Neighbours::new(even.cloud, row);
+    let Blocks { across, .. } = even.asked.blocks;
+    let levels = &even.asked.levels[row * across..][..across];
+    let concerned: Vec<usize> = (0..across).filter(|block| levels[*block] > 0).collect();
+    let neighbours = Neighbours::new(even.cloud, row, &concerned);
     // SAFETY: as the caller's.
     let noise = unsafe { Floats::<S::Widest>::splat(0.0) };
     let mut found = Found { candidates: Vec::new(), number: 0, noise, exact: noise.0 };
-    let across = even.asked.blocks.across;
     let lanes = S::Widest::LANES;
-    for first in (0..across).step_by(lanes) {
-        let group = Group { even, row, first, count: (across - first).min(lanes) };
+    for (number, blocks) in concerned.chunks(lanes).enumerate() {
+        let group = Group { even, row, first: number * lanes, blocks };
         // SAFETY: as the caller's.
         unsafe {
             group.candidates::<S::Widest, S>(&mut found);
-            if found.number > 0 {
-                found.weigh(even.asked.least_noise);
-                for (y, choices) in choices.chunks_mut(even.cloud.width).enumerate() {
-                    for x in 0..BLOCK {
-                        group.choose(&mut found, &neighbours, [x, y], choices);
-                    }
+            found.weigh(even.asked.least_noise);
+            for (y, choices) in choices.chunks_mut(even.cloud.width).enumerate() {
+                for x in 0..BLOCK {
+                    group.choose(&mut found, &neighbours, [x, y], choices);
                 }
             }
         }
     }
 }
 
-/// Blocks side by side of a row, of which `count` are inside the image.
+/// Blocks of a row whose pixels can take windows, as many as there are lanes, or the last ones.
 struct Group<'a> {
     even: &'a EvenWindows<'a>,
     row: usize,
-    /// The first block's column.
+    /// The number of the first among the row's.
     first: usize,
-    count: usize,
+    /// Their columns.
+    blocks: &'a [usize],
 }
 
 /// Columns or rows of blocks, one for each block of a group.
@@ -270,17 +271,17 @@ impl Group<'_> {
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn candidates<S: Simd, G: Groups<Widest = S>>(&self, found: &mut Found<S>) {
-        let &Group { even, row, first, count } = self;
+        let &Group { even, row, blocks, .. } = self;
         let Blocks { across, down, .. } = even.asked.blocks;
         let &Cloud { width, height, .. } = even.cloud;
-        let own = row * across + first;
         let (mut levels, mut radii) = (Lanes::ZERO, Lanes::ZERO);
-        for lane in 0..count {
-            let level = even.asked.levels[own + lane];
-            levels.0[lane] = f32::from(level);
-            if level > 0 {
-                radii.0[lane] = even.asked.largest(own + lane) as f32;
-            }
+        // Lanes without a block stand for the first one, and take nothing.
+        let mut column = Lanes([blocks[0] as f32; LANES]);
+        for (lane, block) in blocks.iter().enumerate() {
+            let own = row * across + block;
+            levels.0[lane] = f32::from(even.asked.levels[own]);
+            radii.0[lane] = even.asked.largest(own) as f32;
+            column.0[lane] = *block as f32;
         }
         found.number = 0;
         // SAFETY: as the caller's; all places are inside the image.
@@ -290,14 +291,7 @@ impl Group<'_> {
             let mut radii = Floats::<S>(radii.load::<S>());
             let mut level = 0.0;
             let takes_any = S::lt(zero.0, levels);
-            if S::bits(takes_any) == 0 {
-                return;
-            }
-            // Lanes outside the image stand for the last block of the row.
-            let last = Floats::<S>::splat((across - 1) as f32);
-            let column = std::array::from_fn(|lane| (first + lane) as f32);
-            let column = Floats::<S>(Lanes(column).load::<S>());
-            let column = Floats::<S>(S::min(column.0, last.0));
+            let column = Floats::<S>(column.load::<S>());
             let row = Floats::<S>::splat(row as f32);
             let columns = Axis { pixels: width, blocks: across, number: 1 };
             let rows = Axis { pixels: height, blocks: down, number: across };
@@ -339,12 +333,12 @@ impl Group<'_> {
         choices: &mut [Option<u32>],
     ) {
         let cloud = self.even.cloud;
-        let x = self.first * BLOCK + column;
-        let pixels = (self.row * BLOCK + row) * cloud.width + x;
+        let x = |lane: usize| self.blocks[lane] * BLOCK + column;
+        let pixels = (self.row * BLOCK + row) * cloud.width;
         let (mut tolerances, mut clean) = (Lanes::ZERO, Lanes::ZERO);
         let mut there = 0;
-        for lane in (0..self.count).take_while(|lane| x + lane * BLOCK < cloud.width) {
-            let pixel = pixels + lane * BLOCK;
+        for lane in (0..self.blocks.len()).take_while(|lane| x(*lane) < cloud.width) {
+            let pixel = pixels + x(lane);
             there |= u32::from(!cloud.is_missing(pixel)) << lane;
             clean.0[lane] = self.even.asked.clean[pixel] as f32;
             tolerances.0[lane] = self.even.tolerance(pixel);
@@ -401,7 +395,7 @@ impl Group<'_> {
             S::store_i(numbers.as_mut_ptr(), S::truncate_i(best));
             for lane in Bits(there) {
                 let best = found.get(numbers[lane] as usize);
-                choices[x + lane * BLOCK] = best.map(|candidates| candidates.places[lane]);
+                choices[x(lane)] = best.map(|candidates| candidates.places[lane]);
             }
         }
     }
@@ -449,34 +443,46 @@ impl Axis {
     }
 }
 
-/// The inverse depths of a row of blocks, and of the pixels' rows above and below.
+/// The inverse depths of blocks of a row, and of the pixels around them.
 struct Neighbours {
-    /// Row by row, for every column of blocks: element i + 1 is the i-th block's; NaN outside the image.
-    inverse_depths: [[Vec<f32>; BLOCK]; BLOCK + 2],
+    /// Row by row and column by column of those pixels, so many of each, block by block; NaN outside the image.
+    inverse_depths: Vec<f32>,
+    blocks: usize,
 }
 
+/// Rows and columns of a block's pixels and those around it.
+const AROUND: usize = BLOCK + 2;
+
 impl Neighbours {
-    fn new(cloud: &Cloud, row: usize) -> Self {
-        let length = cloud.width.div_ceil(BLOCK).next_multiple_of(LANES) + 2;
-        let inverse_depths = std::array::from_fn(|line| {
-            let mut columns = std::array::from_fn(|_| vec![f32::NAN; length]);
+    fn new(cloud: &Cloud, row: usize, blocks: &[usize]) -> Self {
+        let length = blocks.len().next_multiple_of(LANES);
+        let mut inverse_depths = vec![f32::NAN; AROUND * AROUND * length];
+        // With a column before the image, and room behind it for the last block.
+        let mut inverse = vec![f32::NAN; cloud.width + AROUND];
+        for line in 0..AROUND {
             let y = (row * BLOCK + line).wrapping_sub(1);
-            if y < cloud.height {
-                let depths = &cloud.depths[y * cloud.width..(y + 1) * cloud.width];
-                for (x, depth) in depths.iter().enumerate() {
-                    columns[x % BLOCK][x / BLOCK + 1] = inverse_depth(*depth);
+            if y >= cloud.height {
+                continue;
+            }
+            let depths = &cloud.depths[y * cloud.width..][..cloud.width];
+            for (to, depth) in inverse[1..].iter_mut().zip(depths) {
+                *to = inverse_depth(*depth);
+            }
+            for column in 0..AROUND {
+                let to = &mut inverse_depths[(line * AROUND + column) * length..];
+                for (to, block) in to.iter_mut().zip(blocks) {
+                    *to = inverse[block * BLOCK + column];
                 }
             }
-            columns
-        });
-        Neighbours { inverse_depths }
+        }
+        Neighbours { inverse_depths, blocks: length }
     }
 
-    /// Of the points next to those in a column and row of the blocks from column `first` on; around pixels not in
-    /// the mask `noisy`, of these alone.
+    /// Of the points next to those in a column and row of the blocks from the `first` on; around pixels not in the mask
+    /// `noisy`, of these alone.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`; the blocks are inside the image but for those that fill the lanes.
+    /// The processor has the instruction set of `S`; the first is one of the blocks, and starts a group.
     #[inline(always)]
     unsafe fn near<S: Simd>(
         &self,
@@ -484,17 +490,15 @@ impl Neighbours {
         [column, row]: [usize; 2],
         noisy: S::F,
     ) -> Near<S> {
-        // SAFETY: as the caller's; columns hold whole groups, and an element before and behind.
+        // SAFETY: as the caller's; blocks are whole groups.
         unsafe {
             let zero = Floats::<S>::splat(0.0);
             let (mut sum, mut offset, mut points) = (zero, [zero; 2], zero);
             let mut own = zero;
-            for (line, dy) in self.inverse_depths[row..row + 3].iter().zip([-1.0, 0.0, 1.0]) {
-                for (way, dx) in [-1.0, 0.0, 1.0].into_iter().enumerate() {
-                    // Counted from the block before.
-                    let at = BLOCK + column + way - 1;
-                    let column = &line[at % BLOCK];
-                    let inverse = S::load(column.as_ptr().add(first + at / BLOCK));
+            for (line, dy) in (row..row + 3).zip([-1.0, 0.0, 1.0]) {
+                for (column, dx) in (column..column + 3).zip([-1.0, 0.0, 1.0]) {
+                    let at = (line * AROUND + column) * self.blocks + first;
+                    let inverse = S::load(self.inverse_depths[at..].as_ptr());
                     let mut there = S::eq(inverse, inverse);
                     if dx == 0.0 && dy == 0.0 {
                         own = Floats(inverse);
