@@ -17,6 +17,7 @@ use crate::paper::{
     with_missing_as_nan,
 };
 use crate::smoothing_area::window_side;
+use crate::threads::Workers;
 use crate::window::Image;
 
 /// The maps behind the normals; each is written if it is there and must hold width x height elements, row by row,
@@ -358,6 +359,10 @@ impl Engine<'_> {
 }
 
 impl paper::Engine for Engine<'_> {
+    fn workers(&self) -> &Workers {
+        self.scratch.workers()
+    }
+
     fn windows(
         &mut self,
         sizes: &mut Vec<u32>,

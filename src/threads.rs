@@ -1,6 +1,7 @@
 //! Work shared out among threads. Items are fixed by the frame, not by the number of threads, so results are too.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -30,6 +31,21 @@ impl Workers {
 
     pub fn count(&self) -> usize {
         1 + self.pool.as_ref().map_or(0, ThreadPool::current_num_threads)
+    }
+
+    /// Calls `work` with every part.
+    pub fn share_out<T: Send>(
+        &self,
+        parts: impl Iterator<Item = T> + Send,
+        work: impl Fn(T) + Sync,
+    ) {
+        let parts = Mutex::new(parts);
+        let next = || parts.lock().unwrap_or_else(PoisonError::into_inner).next();
+        self.for_each(self.count(), |_, _| {
+            while let Some(part) = next() {
+                work(part);
+            }
+        });
     }
 
     /// Calls `work(worker, item)` for every item; no two calls run at once with the same worker.

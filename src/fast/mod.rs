@@ -90,6 +90,11 @@ impl Scratch {
         Ok(())
     }
 
+    /// The workers, as many as were last asked for.
+    pub fn workers(&self) -> &Workers {
+        &self.workers
+    }
+
     /// Bytes held.
     pub fn size(&self) -> usize {
         let each = self.each.iter().map(|scratch| lock(scratch).size()).sum::<usize>();

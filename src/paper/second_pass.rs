@@ -2,7 +2,7 @@
 
 use std::iter::{once, repeat_n};
 
-use super::blocks::Blocks;
+use super::blocks::{BLOCK, Blocks};
 use super::choices::EvenWindows;
 use super::cloud::Cloud;
 use super::creases::SummedNormals;
@@ -15,10 +15,14 @@ use crate::Error;
 use crate::methods::Estimate;
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
+use crate::threads::Workers;
 
 /// How windows and their estimates are computed: by the plain forms, or fast. Estimates are normals, turned to the
 /// viewpoint, and curvatures.
 pub(crate) trait Engine {
+    /// The threads.
+    fn workers(&self) -> &Workers;
+
     /// Every pixel's window, 0 for none, as a radius, or in PCL's semantics as a side; and its estimate.
     fn windows(&mut self, sizes: &mut Vec<u32>, estimates: &mut Vec<[f32; 4]>)
     -> Result<(), Error>;
@@ -97,7 +101,7 @@ impl SecondPass {
             return Ok(&self.estimates);
         }
         let blocks = Blocks::of(cloud.width, cloud.height);
-        self.concern(cloud, &blocks, options);
+        self.concern(cloud, &blocks, options, engine.workers());
         let SecondPass { wanted, levels, windows, choices, taken, second, .. } = self;
         let clean = depth_changes(cloud, options).not_explained(cloud).clean_radii();
         let least_noise = Asked::least_noise(options.paper.alpha);
@@ -111,21 +115,22 @@ impl SecondPass {
             taken[block] = even.radius(block);
         }
         engine.of_blocks(&blocks, taken, second)?;
-        self.replace(cloud, options);
+        self.replace(cloud, options, engine.workers());
         Ok(&self.estimates)
     }
 
     /// Finds the pixels that another window may serve better than their own.
-    fn concern(&mut self, cloud: &Cloud, blocks: &Blocks, options: &Options) {
+    fn concern(&mut self, cloud: &Cloud, blocks: &Blocks, options: &Options, workers: &Workers) {
         let SecondPass { estimates, sizes, wanted, concerned, levels, normals, .. } = self;
         if options.crease_windows {
             normals.sum(estimates, blocks);
         }
         refill(concerned, repeat_n(false, sizes.len()));
-        wanted.clear();
-        levels.clear();
-        let places = (0..blocks.down).flat_map(|row| (0..blocks.across).map(move |x| (x, row)));
-        for pixels in places.map(|place| blocks.pixels(place)) {
+        refill(wanted, repeat_n(0, blocks.count()));
+        refill(levels, repeat_n(0, blocks.count()));
+        let (estimates, sizes, normals) = (&*estimates, &*sizes, &*normals);
+        // The window and the level of a block; marks its pixels, of which `concerned` starts with number `first`.
+        let concern = |pixels: [usize; BLOCK * BLOCK], first: usize, concerned: &mut [bool]| {
             let has_window = |at: usize| sizes[at] > 0 && !cloud.is_missing(at);
             let middle = pixels[pixels.len() / 2];
             let inner = || once(middle).chain(pixels).find(|at| has_window(*at));
@@ -138,41 +143,55 @@ impl SecondPass {
                 largest = size.max(largest);
                 let has_none = || estimates[at][0].is_nan() && !cloud.is_missing(at);
                 if options.one_sided_windows && (sizes[at] < size || has_none()) {
-                    concerned[at] = true;
+                    concerned[at - first] = true;
                     level = EVERY_LEVEL;
                 } else if is_near_crease && has_window(at) {
-                    concerned[at] = true;
+                    concerned[at - first] = true;
                     level = CREASE_LEVELS.max(level);
                 }
             }
-            wanted.push(radius_of_size(largest, options).min(options.paper.largest_radius));
-            levels.push(level);
-        }
+            (radius_of_size(largest, options).min(options.paper.largest_radius), level)
+        };
+        let rows = concerned.chunks_mut(BLOCK * cloud.width).enumerate();
+        let of_blocks = wanted.chunks_mut(blocks.across).zip(levels.chunks_mut(blocks.across));
+        workers.share_out(rows.zip(of_blocks), |((row, concerned), (wanted, levels))| {
+            for (column, (wanted, level)) in wanted.iter_mut().zip(levels).enumerate() {
+                let pixels = blocks.pixels((column, row));
+                (*wanted, *level) = concern(pixels, row * BLOCK * cloud.width, concerned);
+            }
+        });
     }
 
     /// Gives the pixels concerned the estimates of the windows that they take.
-    fn replace(&mut self, cloud: &Cloud, options: &Options) {
+    fn replace(&mut self, cloud: &Cloud, options: &Options, workers: &Workers) {
         let SecondPass { estimates, concerned, choices, second, .. } = self;
-        for at in (0..estimates.len()).filter(|at| concerned[*at]) {
+        let replace = |at: usize, estimate: &mut [f32; 4]| {
             let around = || {
                 let pixel = (at % cloud.width, at / cloud.width);
                 let same = |depth: f32, difference: f32, distance: usize| {
                     !is_depth_change(depth, difference, distance.max(1), options)
                 };
-                let has_none = options.one_sided_windows && estimates[at][0].is_nan();
+                let has_none = options.one_sided_windows && estimate[0].is_nan();
                 has_none.then(|| surroundings::plane_around(cloud, pixel, same)).flatten()
             };
             let found = match choices[at].map(|block| second[block as usize]) {
                 Some(found) if !found[0].is_nan() => found,
                 _ => match around() {
                     Some(found) => found.into(),
-                    None => continue,
+                    None => return,
                 },
             };
             let [x, y, z, curvature] = found;
             let normal = turn_to_viewpoint([x, y, z], cloud.points[at], options.viewpoint);
-            estimates[at] = Estimate { normal, curvature }.into();
-        }
+            *estimate = Estimate { normal, curvature }.into();
+        };
+        workers.share_out(estimates.chunks_mut(cloud.width).enumerate(), |(row, estimates)| {
+            for (at, estimate) in (row * cloud.width..).zip(estimates) {
+                if concerned[at] {
+                    replace(at, estimate);
+                }
+            }
+        });
         if options.method != Method::CovarianceMatrix {
             estimates.iter_mut().for_each(|estimate| estimate[3] = f32::NAN);
         }

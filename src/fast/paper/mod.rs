@@ -158,12 +158,8 @@ pub(crate) fn choices(
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
     scratch.prepare(threads)?;
-    let &Cloud { width, height, .. } = even.cloud;
-    let parts = Parts(choices.as_mut_ptr());
-    scratch.workers.for_each(even.asked.blocks.down, |_, row| {
-        let rows = row * BLOCK..((row + 1) * BLOCK).min(height);
-        // SAFETY: rows of blocks do not overlap.
-        let choices = unsafe { parts.part(rows.start * width..rows.end * width) };
+    let rows = choices.chunks_mut(BLOCK * even.cloud.width).enumerate();
+    scratch.workers.share_out(rows, |(row, choices)| {
         // SAFETY: the processor has the instruction set.
         unsafe { paths::run(isa, ChoicesTask { even, row, choices }) };
     });
@@ -229,10 +225,8 @@ impl<'a> Job<'a> {
         let super::Scratch { workers, paper, .. } = scratch;
         let length = row_length(points.width());
         paper.depths.try_grow(length * points.height())?;
-        let parts = Parts(paper.depths.as_mut_ptr());
-        workers.for_each(points.height(), |_, y| {
-            // SAFETY: rows do not overlap.
-            let depths = unsafe { parts.part(y * length..(y + 1) * length) };
+        let rows = paper.depths[..length * points.height()].chunks_mut(length).enumerate();
+        workers.share_out(rows, |(y, depths)| {
             let task = DepthsTask { points, options, y, whole_points, depths };
             // SAFETY: the processor has the instruction set.
             unsafe { paths::run(self.isa, task) };
