@@ -34,7 +34,7 @@ impl Workers {
     }
 
     /// Calls `work` with every part.
-    pub fn share_out<T: Send>(
+    pub fn for_each_part<T: Send>(
         &self,
         parts: impl Iterator<Item = T> + Send,
         work: impl Fn(T) + Sync,

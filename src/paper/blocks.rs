@@ -6,6 +6,13 @@ pub(crate) const BLOCK: usize = 3;
 /// Columns and rows before a block's middle pixel.
 pub(crate) const MIDDLE: usize = BLOCK / 2;
 
+/// The middle column or row, of so many in the image, of a block of `size` that starts at `first`; where that is cut off,
+/// the last one inside the image.
+#[inline(always)]
+pub(crate) fn middle(first: usize, size: usize, count: usize) -> usize {
+    (first + size / 2).min(count - 1)
+}
+
 /// An image's blocks, row by row; those at its right and lower edges may be cut.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Blocks {
@@ -25,10 +32,10 @@ impl Blocks {
         self.across * self.down
     }
 
-    /// Column and row of a block's middle pixel; where that is cut off, of the last one inside the image.
+    /// Column and row of a block's middle pixel.
     pub fn middle(&self, block: usize) -> (usize, usize) {
-        let [x, y] = [block % self.across, block / self.across].map(|at| at * BLOCK + MIDDLE);
-        (x.min(self.width - 1), y.min(self.height - 1))
+        let [x, y] = [block % self.across, block / self.across].map(|at| at * BLOCK);
+        (middle(x, BLOCK, self.width), middle(y, BLOCK, self.height))
     }
 
     /// The numbers of a block's pixels; the last ones inside the image stand for those that are cut off.

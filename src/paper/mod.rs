@@ -19,7 +19,7 @@ pub(crate) mod smoothing_area;
 mod summed_area;
 mod surroundings;
 
-pub(crate) use blocks::{BLOCK, Blocks, MIDDLE};
+pub(crate) use blocks::{BLOCK, Blocks, MIDDLE, middle};
 pub(crate) use choices::{
     CREASE_COST, CREASE_NOISE, EXACT_SHARE, EvenWindows, MISFIT, NEAR, NEAR_NOISE, REACH,
 };

@@ -154,7 +154,7 @@ impl SecondPass {
         };
         let rows = concerned.chunks_mut(BLOCK * cloud.width).enumerate();
         let of_blocks = wanted.chunks_mut(blocks.across).zip(levels.chunks_mut(blocks.across));
-        workers.share_out(rows.zip(of_blocks), |((row, concerned), (wanted, levels))| {
+        workers.for_each_part(rows.zip(of_blocks), |((row, concerned), (wanted, levels))| {
             for (column, (wanted, level)) in wanted.iter_mut().zip(levels).enumerate() {
                 let pixels = blocks.pixels((column, row));
                 (*wanted, *level) = concern(pixels, row * BLOCK * cloud.width, concerned);
@@ -185,7 +185,7 @@ impl SecondPass {
             let normal = turn_to_viewpoint([x, y, z], cloud.points[at], options.viewpoint);
             *estimate = Estimate { normal, curvature }.into();
         };
-        workers.share_out(estimates.chunks_mut(cloud.width).enumerate(), |(row, estimates)| {
+        workers.for_each_part(estimates.chunks_mut(cloud.width).enumerate(), |(row, estimates)| {
             for (at, estimate) in (row * cloud.width..).zip(estimates) {
                 if concerned[at] {
                     replace(at, estimate);

@@ -10,7 +10,7 @@ use crate::fast::Parts;
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::paper::{
     Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, MIDDLE, Plane,
-    inverse_depth,
+    inverse_depth, middle,
 };
 use crate::simd::{GROUP, Groups};
 
@@ -107,8 +107,8 @@ impl EvenTile<'_> {
         rings.start(columns, top, rows_of_rings(reach, height));
         let mut next = top;
         for y in self.rows.clone().step_by(BLOCK) {
-            let middle = (y + MIDDLE).min(height - 1);
-            while next < (middle + reach + 1).min(bottom) {
+            let row = middle(y, BLOCK, height);
+            while next < (row + reach + 1).min(bottom) {
                 rings.read_positions(&depths[next * width..], next);
                 rings.push(&moments, next);
                 next += 1;
@@ -116,10 +116,9 @@ impl EvenTile<'_> {
             for x in self.columns.clone().step_by(GROUP * BLOCK) {
                 let block = self.asked.blocks.block(y * width + x);
                 let blocks = block..block + (self.columns.end - x).div_ceil(BLOCK).min(GROUP);
-                let middle = (x + MIDDLE, middle);
                 // SAFETY: as the caller's.
                 unsafe {
-                    let found = self.eight::<S>(rings, &moments, middle, blocks.clone());
+                    let found = self.eight::<S>(rings, &moments, (x + MIDDLE, row), blocks.clone());
                     found.write(windows.part(blocks));
                 }
             }

@@ -159,7 +159,7 @@ pub(crate) fn choices(
 ) -> Result<(), Error> {
     scratch.prepare(threads)?;
     let rows = choices.chunks_mut(BLOCK * even.cloud.width).enumerate();
-    scratch.workers.share_out(rows, |(row, choices)| {
+    scratch.workers.for_each_part(rows, |(row, choices)| {
         // SAFETY: the processor has the instruction set.
         unsafe { paths::run(isa, ChoicesTask { even, row, choices }) };
     });
@@ -226,7 +226,7 @@ impl<'a> Job<'a> {
         let length = row_length(points.width());
         paper.depths.try_grow(length * points.height())?;
         let rows = paper.depths[..length * points.height()].chunks_mut(length).enumerate();
-        workers.share_out(rows, |(y, depths)| {
+        workers.for_each_part(rows, |(y, depths)| {
             let task = DepthsTask { points, options, y, whole_points, depths };
             // SAFETY: the processor has the instruction set.
             unsafe { paths::run(self.isa, task) };
@@ -290,7 +290,8 @@ impl<'a> Job<'a> {
         Ok(given.iter().max().map_or(0, |largest| *largest as usize))
     }
 
-    /// The normals of the middle pixels of blocks of `step` x `step` pixels, tile by tile; no window's radius is above `largest`.
+    /// The normals of the middle pixels of blocks of `step` x `step` pixels, tile by tile; no window's radius is above
+    /// `largest`.
     #[inline(never)]
     fn tiles(
         &self,

@@ -14,7 +14,7 @@ use crate::fast::tile::{Bits, Estimates};
 use crate::methods::Estimate;
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
-use crate::paper::{CleanPoints, Cleaned, Rect, plain_estimate, window};
+use crate::paper::{CleanPoints, Cleaned, Rect, middle, plain_estimate, window};
 use crate::simd::{GROUP, Groups};
 
 /// A rectangle of the image whose normals are computed together.
@@ -54,8 +54,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         unsafe { rings.read::<S>(self.points, (self.row)(top).0, top, self.whole_points) };
         let mut next = top;
         for y in self.rows.clone().step_by(self.step) {
-            let (_, middle) = self.middle((0, y));
-            while next < (middle + reach + 1).min(bottom) {
+            while next < (middle(y, self.step, height) + reach + 1).min(bottom) {
                 if next + 1 < height {
                     let depths = (self.row)(next + 1).0;
                     // SAFETY: as the caller's.
@@ -70,14 +69,6 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
             // SAFETY: as the caller's.
             unsafe { self.row::<S, M, N>(rings, sink, &mut run, y, error) };
         }
-    }
-
-    /// The middle pixel of the block that starts at one; where that is cut off, the last one inside the image.
-    #[inline(always)]
-    fn middle(&self, (x, y): (usize, usize)) -> (usize, usize) {
-        let before = self.step / 2;
-        let (width, height) = (self.points.width(), self.points.height());
-        ((x + before).min(width - 1), (y + before).min(height - 1))
     }
 
     /// A point of the tile: sums about it lose less.
@@ -107,7 +98,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let (points, sums) = rings.parts();
         let radii = (self.row)(y).1;
         let step = self.step;
-        let (_, middle) = self.middle((0, y));
+        let middle_row = middle(y, step, image[1]);
         let mut steps = [0; GROUP];
         for (lane, to) in steps.iter_mut().enumerate() {
             *to = (lane * step) as i32;
@@ -119,7 +110,8 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
             for (group, x) in (start..end).step_by(GROUP * step).enumerate() {
                 let at = group * GROUP;
                 let count = (end - x).div_ceil(step).min(GROUP);
-                let place = Place { image, x: x + step / 2, y: middle, step, left, stride, rows };
+                let (x, y) = (x + step / 2, middle_row);
+                let place = Place { image, x, y, step, left, stride, rows };
                 // SAFETY: as the caller's; the rings hold what the windows of the tile's pixels need.
                 unsafe {
                     let eight = S::load(radii[x / step..].as_ptr());
@@ -133,8 +125,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                     let rects = Rects::new::<S, N>(&place, eight, M::INNER, M::ENDS);
                     let sums = rects.sums::<S, N>(sums);
                     M::note::<S>(&sums, &rects, points, windows, &mut run.sums, at);
-                    let [px, py, pz, _] =
-                        gather::<S>(rings.points_from(x + step / 2, middle), &steps);
+                    let [px, py, pz, _] = gather::<S>(rings.points_from(x, y), &steps);
                     run.points.store::<S>(at, [px, py, pz]);
                 }
             }
@@ -172,7 +163,8 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                     sink.write_none(x / step, y / step, count);
                     continue;
                 }
-                let pixel = |lane: usize| self.middle((x + lane * step, y));
+                let pixel =
+                    |lane: usize| (middle(x + lane * step, step, width), middle(y, step, height));
                 let rect = |lane: usize| {
                     window(pixel(lane), radii[x / step + lane] as usize, width, height)
                 };
