@@ -2,7 +2,7 @@
 
 use std::iter::{once, repeat_n};
 
-use super::blocks::{BLOCK, Blocks};
+use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::choices::EvenWindows;
 use super::cloud::Cloud;
 use super::creases::SummedNormals;
@@ -132,11 +132,11 @@ impl SecondPass {
         // The window and the level of a block; marks its pixels, of which `concerned` starts with number `first`.
         let concern = |pixels: [usize; BLOCK * BLOCK], first: usize, concerned: &mut [bool]| {
             let has_window = |at: usize| sizes[at] > 0 && !cloud.is_missing(at);
-            let middle = pixels[pixels.len() / 2];
-            let inner = || once(middle).chain(pixels).find(|at| has_window(*at));
+            let middle = pixels[MIDDLE * BLOCK + MIDDLE];
+            let with_window = || once(middle).chain(pixels).find(|at| has_window(*at));
             let normals_vary =
                 |at: usize| normals.vary_in(&window_of_size(cloud, options, at, sizes[at]));
-            let is_near_crease = options.crease_windows && inner().is_some_and(normals_vary);
+            let is_near_crease = options.crease_windows && with_window().is_some_and(normals_vary);
             let (mut largest, mut level) = (0, 0);
             for at in pixels {
                 let size = wanted_size(cloud, options, at);
