@@ -71,6 +71,27 @@ fn the_number_of_threads_does_not_matter() {
     }
 }
 
+/// Rows swept for their neighbours only do not know of all depth changes: their windows look larger than any is.
+#[test]
+fn where_depth_changes_are_far_away_the_number_of_threads_does_not_matter_either() {
+    let (width, height) = (300, 600);
+    let mut cloud = Cloud::new(Kind::Noisy, width, height, 21);
+    for (at, point) in cloud.points.iter_mut().enumerate() {
+        point[2] += (at / width / 23 % 2) as f32;
+    }
+    let mut all = paper_options();
+    all.extend(edge_options());
+    for mut options in all {
+        options.threads = 1;
+        let one = compute(&mut Estimator::new(options.clone()), &cloud);
+        for threads in [2, 3] {
+            options.threads = threads;
+            let found = compute(&mut Estimator::new(options.clone()), &cloud);
+            assert_same_bits(&found, &one, width, &format!("{options:?}"));
+        }
+    }
+}
+
 /// The indices' normals, by the estimator, in an array of their own.
 fn listed(estimator: &mut Estimator, cloud: &Cloud, indices: &[i32]) -> Vec<[f32; 4]> {
     let mut found = vec![[7.0; 4]; indices.len()];

@@ -251,10 +251,11 @@ impl<'a> Job<'a> {
         if options.paper.distance_metric == DistanceMetric::Euclidean {
             let parts = Parts(radii.as_mut_ptr());
             workers.for_each(chunks.len(), |worker, item| {
-                let Chunk { swept, start, .. } = &chunks[item];
+                let Chunk { swept, start, own } = &chunks[item];
                 // SAFETY: chunks have rows of their own.
                 let map = unsafe { parts.part(start * length..(start + swept.len()) * length) };
-                let rows = Rows { width, first: swept.start, count: swept.len(), depths, map };
+                let (first, count, own) = (swept.start, swept.len(), own.clone());
+                let rows = Rows { width, first, count, own, depths, map };
                 let sweep = &mut lock(&each[worker]).paper.sweep;
                 // SAFETY: the processor has the instruction set.
                 let radius = unsafe { paths::run(self.isa, SweepTask { rows, options, sweep }) };

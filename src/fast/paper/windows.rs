@@ -5,6 +5,8 @@
 //! A distance matters up to the largest radius times the square root of 2 only, so that the nearest column's change
 //! is looked for that far, and no farther than the group of pixels needs.
 
+use std::ops::Range;
+
 use super::depths::row_length;
 use crate::fast::buffer::Buffer;
 use crate::fast::lanes::LANES;
@@ -43,6 +45,8 @@ pub(crate) struct Rows<'a> {
     pub width: usize,
     pub first: usize,
     pub count: usize,
+    /// Those whose radii are asked for: the others may lack depth changes behind the ends.
+    pub own: Range<usize>,
     pub depths: &'a [f32],
     pub map: &'a mut [f32],
 }
@@ -75,7 +79,7 @@ impl Sweep {
         rows + along.capacity() * size_of::<[f32; LANES]>()
     }
 
-    /// Fills the map with the windows' radii, whole numbers of pixels, 0 for none. Returns the largest.
+    /// Fills the map with the windows' radii, whole numbers of pixels, 0 for none. Returns the largest of the own rows.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
@@ -207,12 +211,16 @@ impl Sweep {
                 // No depth change lies behind the row's end.
                 squares[margin + rows.width..].fill(FAR * FAR);
                 let depths = rows.depths(y).as_ptr();
+                let mut largest_of_row = S::splat(0.0);
                 for x in (0..inside).step_by(LANES) {
                     let depth = S::load(depths.add(x));
                     let squares = squares.as_ptr().add(margin + x);
                     let radius = radius::<S>(depth, squares, &self.along, options);
-                    largest = S::max(radius, largest);
+                    largest_of_row = S::max(radius, largest_of_row);
                     S::store(map.add(x), radius);
+                }
+                if rows.own.contains(&y) {
+                    largest = S::max(largest_of_row, largest);
                 }
             }
             let mut lanes = [0.0; LANES];
