@@ -1,6 +1,10 @@
 //! Step 1: the depth change indication map (the paper's C, Eq. 6-7, with PCL's threshold and neighbours).
 
+use std::iter::repeat_n;
+
+use crate::Error;
 use crate::cloud::Points;
+use crate::memory::table;
 
 /// Depth change threshold of a pixel at depth `z`: PCL's `max_depth_change_factor_ * (|z| + 1) * 2`, in f32.
 #[inline(always)]
@@ -17,9 +21,9 @@ pub(crate) fn is_depth_change(z: f32, neighbour: f32, factor: f32) -> bool {
 /// The depth change indication map, row by row: true where the pixel is next to a depth change.
 ///
 /// As PCL, the last row's and the last column's pixels are not tested against their own neighbours.
-pub(crate) fn depth_change_map(points: &Points, factor: f32) -> Vec<bool> {
+pub(crate) fn depth_change_map(points: &Points, factor: f32) -> Result<Vec<bool>, Error> {
     let (width, height) = (points.width(), points.height());
-    let mut map = vec![false; width * height];
+    let mut map = table(repeat_n(false, width * height))?;
     for y in 0..height - 1 {
         for x in 0..width - 1 {
             let z = points.z(x, y);
@@ -31,5 +35,5 @@ pub(crate) fn depth_change_map(points: &Points, factor: f32) -> Vec<bool> {
             }
         }
     }
-    map
+    Ok(map)
 }

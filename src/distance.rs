@@ -3,6 +3,9 @@
 //! PCL's two chamfer passes (after Borgefors 1986) with weights 1 and 1.4, every value a chain of f32 additions.
 //! Their order and their treatment of the image's edges decide windows, so both are kept to the bit.
 
+use crate::Error;
+use crate::memory::table;
+
 pub(crate) const STRAIGHT: f32 = 1.0;
 pub(crate) const DIAGONAL: f32 = 1.4;
 
@@ -15,10 +18,13 @@ pub(crate) fn far(width: usize, height: usize) -> f32 {
 ///
 /// As PCL, the forward pass leaves row 0 and column 0 as they are, the backward pass the last row and column,
 /// and at the row's ends the diagonal neighbour outside the image is the other end of the current row.
-pub(crate) fn distance_map(depth_changes: &[bool], width: usize, height: usize) -> Vec<f32> {
+pub(crate) fn distance_map(
+    depth_changes: &[bool],
+    width: usize,
+    height: usize,
+) -> Result<Vec<f32>, Error> {
     let far = far(width, height);
-    let mut map: Vec<f32> =
-        depth_changes.iter().map(|&change| if change { 0.0 } else { far }).collect();
+    let mut map = table(depth_changes.iter().map(|&change| if change { 0.0 } else { far }))?;
     let nearer = |map: &mut [f32], at: usize, neighbours: [usize; 4]| {
         for (i, neighbour) in neighbours.into_iter().enumerate() {
             let step = if i < 2 { STRAIGHT } else { DIAGONAL };
@@ -37,5 +43,5 @@ pub(crate) fn distance_map(depth_changes: &[bool], width: usize, height: usize) 
             nearer(&mut map, at, [at + 1, at + width, at + width + 1, at + width - 1]);
         }
     }
-    map
+    Ok(map)
 }

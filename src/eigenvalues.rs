@@ -3,6 +3,7 @@
 
 use std::ops::Range;
 
+use crate::Error;
 use crate::cloud::Points;
 use crate::eigen::{Scatter, Symmetric3, eigen};
 use crate::methods::finite_point;
@@ -23,13 +24,14 @@ pub(crate) fn eigenvalue_map<W: Iterator<Item = Rect> + Clone>(
     points: &Points,
     reach: usize,
     window: impl Fn(usize, usize) -> Option<W>,
-) -> Vec<[f32; 3]> {
+) -> Result<Vec<[f32; 3]>, Error> {
     let (width, height) = (points.width(), points.height());
-    let mut map = Vec::with_capacity(width * height);
+    let mut map = Vec::new();
+    map.try_reserve(width * height)?;
     let mut band = Band::default();
     for first in (0..height).step_by(BAND_ROWS.max(reach)) {
         let own = first..(first + BAND_ROWS.max(reach)).min(height);
-        band.sum(points, first.saturating_sub(reach)..(own.end + reach).min(height));
+        band.sum(points, first.saturating_sub(reach)..(own.end + reach).min(height))?;
         for y in own {
             map.extend((0..width).map(|x| {
                 let values = window(x, y).and_then(|window| band.eigenvalues(points, window));
@@ -37,7 +39,7 @@ pub(crate) fn eigenvalue_map<W: Iterator<Item = Rect> + Clone>(
             }));
         }
     }
-    map
+    Ok(map)
 }
 
 /// Sums over some rows.
@@ -51,7 +53,7 @@ struct Band {
 }
 
 impl Band {
-    fn sum(&mut self, points: &Points, rows: Range<usize>) {
+    fn sum(&mut self, points: &Points, rows: Range<usize>) -> Result<(), Error> {
         let width = points.width();
         let whole = Rect { x: 0..width, y: rows.clone() };
         // Sums about a point of the band lose less.
@@ -63,9 +65,10 @@ impl Band {
                 let [x, y, z]: [f64; 3] = std::array::from_fn(|i| point[i] - origin[i]);
                 [1.0, x, y, z, x * x, x * y, x * z, y * y, y * z, z * z]
             })
-        });
+        })?;
         let [.., xx, _, _, yy, _, zz] = self.sums.sum(&Rect { x: 0..width, y: 0..rows.len() });
         self.error = ROUNDING * (xx + yy + zz);
+        Ok(())
     }
 
     /// The eigenvalues of the points in a window.

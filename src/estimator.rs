@@ -9,12 +9,12 @@ use crate::distance::distance_map;
 use crate::eigenvalues::eigenvalue_map;
 use crate::fast::{self, SIZES, Scratch};
 use crate::isa::Isa;
+use crate::memory::{refill, resize};
 use crate::methods::{Estimate, estimate, estimate_window, start};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
 use crate::paper::{
-    self, Asked, Blocks, Cloud, EvenWindow, EvenWindows, PaperMaps, SecondPass, refill,
-    with_missing_as_nan,
+    self, Asked, Blocks, Cloud, EvenWindow, EvenWindows, PaperMaps, SecondPass, with_missing_as_nan,
 };
 use crate::smoothing_area::window_side;
 use crate::threads::Workers;
@@ -161,7 +161,7 @@ impl Estimator {
             let estimates = self.estimates(points)?;
             write(&|pixel| estimates[pixel].into());
         } else {
-            let plain = Plain::new(points, &self.options);
+            let plain = Plain::new(points, &self.options)?;
             write(&|pixel| plain.estimate(pixel % width, pixel / width));
         }
         Ok(())
@@ -194,7 +194,7 @@ impl Estimator {
         let found = match self.options.semantics {
             Semantics::Pcl => {
                 let (width, height) = (points.width(), points.height());
-                let cleaned = self.without_zeros(points);
+                let cleaned = self.without_zeros(points)?;
                 let cleaned = cleaned.as_ref().map(|cleaned| packed(cleaned, width, height));
                 let border_policy = self.options.border_policy;
                 let image = Image { width, height, border_policy };
@@ -233,7 +233,7 @@ impl Estimator {
         {
             return Err(Error::Unsupported);
         }
-        let cleaned = self.without_zeros(points);
+        let cleaned = self.without_zeros(points)?;
         let cleaned = cleaned.as_ref().map(|cleaned| packed(cleaned, width, height));
         let points = cleaned.as_ref().unwrap_or(points);
         let write = |map: &mut Option<&mut [f32]>, from: &[f32]| {
@@ -243,26 +243,27 @@ impl Estimator {
         };
         let depth_changes = match self.options.semantics {
             Semantics::Pcl => {
-                let plain = Plain::new(points, &self.options);
+                let plain = Plain::new(points, &self.options)?;
+                let eigenvalues = maps.eigenvalues.is_some().then(|| plain.eigenvalue_map());
+                let eigenvalues = eigenvalues.transpose()?;
                 write(&mut maps.distances, &plain.distances);
                 if let Some(map) = &mut maps.smoothing_areas {
                     for (at, to) in map.iter_mut().enumerate() {
                         *to = plain.window_side(at % width, at / width) as f32;
                     }
                 }
-                if let Some(map) = &mut maps.eigenvalues {
-                    map.copy_from_slice(plain.eigenvalue_map().as_flattened());
-                }
+                write(&mut maps.eigenvalues, eigenvalues.unwrap_or_default().as_flattened());
                 plain.depth_changes
             }
             Semantics::Paper => {
-                let of_paper = PaperMaps::new(points, &self.options);
+                let of_paper = PaperMaps::new(points, &self.options)?;
+                let eigenvalues =
+                    maps.eigenvalues.is_some().then(|| of_paper.eigenvalue_map(points));
+                let eigenvalues = eigenvalues.transpose()?;
                 write(&mut maps.depth_radii, &of_paper.depth_radii);
                 write(&mut maps.distances, &of_paper.distances);
                 write(&mut maps.smoothing_areas, &of_paper.smoothing_radii);
-                if let Some(map) = &mut maps.eigenvalues {
-                    map.copy_from_slice(of_paper.eigenvalue_map(points).as_flattened());
-                }
+                write(&mut maps.eigenvalues, eigenvalues.unwrap_or_default().as_flattened());
                 of_paper.depth_changes
             }
         };
@@ -275,15 +276,16 @@ impl Estimator {
     }
 
     /// A copy of the points without zeros, where those are missing.
-    fn without_zeros(&self, points: &Points) -> Option<Vec<[f32; 3]>> {
-        self.options.zero_is_missing.then(|| with_missing_as_nan(points, &self.options))
+    fn without_zeros(&self, points: &Points) -> Result<Option<Vec<[f32; 3]>>, Error> {
+        let cleaned = || with_missing_as_nan(points, &self.options);
+        self.options.zero_is_missing.then(cleaned).transpose()
     }
 
     /// All pixels' estimates where PCL's windows and sums alone are not what is asked for.
     fn estimates(&mut self, points: &Points) -> Result<&[[f32; 4]], Error> {
         let is_plain = self.is_plain(points);
         let Estimator { options, isa, scratch, cloud, second_pass } = self;
-        cloud.read(points, options);
+        cloud.read(points, options)?;
         // To PCL's windows, a point that misses a coordinate is missing whole.
         let is_pcl = options.semantics == Semantics::Pcl;
         let cleaned = is_pcl.then(|| packed(&cloud.points, cloud.width, cloud.height));
@@ -328,7 +330,7 @@ impl Engine<'_> {
         estimates: &mut Vec<[f32; 4]>,
         compute: impl FnOnce(Isa, &Points, &Options, &Normals, &mut Scratch) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        estimates.resize(width * height, Estimate::NONE.into());
+        resize(estimates, width * height, Estimate::NONE.into())?;
         let estimates = estimates.as_flattened_mut();
         let normals = Normals::interleaved(estimates, width, height, 4, 0, Some(3))?;
         compute(self.isa, self.points, self.options, &normals, self.scratch)
@@ -337,10 +339,10 @@ impl Engine<'_> {
     /// The plain form's estimates of these pixels, where there are some.
     fn plain(
         &self,
-        pixels: impl Iterator<Item = (usize, usize)>,
+        pixels: impl ExactSizeIterator<Item = (usize, usize)>,
         estimates: &mut Vec<[f32; 4]>,
         estimate: impl Fn((usize, usize)) -> Option<Estimate>,
-    ) {
+    ) -> Result<(), Error> {
         let turned = |(x, y): (usize, usize)| {
             estimate((x, y)).map_or(Estimate::NONE, |found| {
                 let point = self.points.at(x, y);
@@ -348,7 +350,7 @@ impl Engine<'_> {
                 Estimate { normal, ..found }
             })
         };
-        refill(estimates, pixels.map(|pixel| turned(pixel).into()));
+        refill(estimates, pixels.map(|pixel| turned(pixel).into()))
     }
 
     /// The plain form's estimate of the paper's method from the window of a radius, if that is not 0.
@@ -376,17 +378,16 @@ impl paper::Engine for Engine<'_> {
                     fast::compute_with_sides(isa, points, options, normals, sizes, scratch)
                 });
             }
-            let plain = Plain::new(self.points, self.options);
+            let plain = Plain::new(self.points, self.options)?;
             let side = |at: usize| plain.window_side(at % width, at / width);
-            refill(sizes, (0..width * height).map(side));
-            self.plain(pixels, estimates, |(x, y)| Some(plain.estimate(x, y)));
-            return Ok(());
+            refill(sizes, (0..width * height).map(side))?;
+            return self.plain(pixels, estimates, |(x, y)| Some(plain.estimate(x, y)));
         }
         if self.is_plain {
-            let maps = PaperMaps::new(self.points, self.options);
-            refill(sizes, maps.smoothing_radii.iter().map(|radius| *radius as u32));
-            self.plain(pixels, estimates, |(x, y)| self.of_radius((x, y), sizes[y * width + x]));
-            return Ok(());
+            let maps = PaperMaps::new(self.points, self.options)?;
+            refill(sizes, maps.smoothing_radii.iter().map(|radius| *radius as u32))?;
+            let of_radius = |(x, y)| self.of_radius((x, y), sizes[y * width + x]);
+            return self.plain(pixels, estimates, of_radius);
         }
         self.written(size, estimates, |isa, points, options, normals, scratch| {
             fast::paper::compute_with_radii(isa, points, options, normals, sizes, scratch)
@@ -401,8 +402,7 @@ impl paper::Engine for Engine<'_> {
         windows: &mut Vec<EvenWindow>,
     ) -> Result<(), Error> {
         if self.is_plain {
-            refill(windows, paper::even_windows(cloud, asked, needed));
-            return Ok(());
+            return refill(windows, paper::even_windows(cloud, asked, needed));
         }
         let threads = self.options.threads;
         fast::paper::even_windows(self.isa, cloud, asked, needed, windows, threads, self.scratch)
@@ -410,10 +410,9 @@ impl paper::Engine for Engine<'_> {
 
     fn choices(&mut self, even: &EvenWindows, choices: &mut Vec<Option<u32>>) -> Result<(), Error> {
         if self.is_plain {
-            refill(choices, even.choices());
-            return Ok(());
+            return refill(choices, even.choices());
         }
-        refill(choices, repeat_n(None, even.cloud.depths.len()));
+        refill(choices, repeat_n(None, even.cloud.depths.len()))?;
         fast::paper::choices(self.isa, even, choices, self.options.threads, self.scratch)
     }
 
@@ -426,8 +425,7 @@ impl paper::Engine for Engine<'_> {
         if self.is_plain {
             let pixels = (0..blocks.count()).map(|block| blocks.middle(block));
             let radius = |(x, y)| radii[blocks.block(y * self.points.width() + x)];
-            self.plain(pixels, estimates, |pixel| self.of_radius(pixel, radius(pixel)));
-            return Ok(());
+            return self.plain(pixels, estimates, |pixel| self.of_radius(pixel, radius(pixel)));
         }
         let size = (blocks.across, blocks.down);
         self.written(size, estimates, |isa, points, options, normals, scratch| {
@@ -446,12 +444,12 @@ struct Plain<'a> {
 }
 
 impl<'a> Plain<'a> {
-    fn new(points: &'a Points, options: &'a Options) -> Self {
+    fn new(points: &'a Points, options: &'a Options) -> Result<Self, Error> {
         let (width, height) = (points.width(), points.height());
-        let depth_changes = depth_change_map(points, options.max_depth_change_factor);
-        let distances = distance_map(&depth_changes, width, height);
+        let depth_changes = depth_change_map(points, options.max_depth_change_factor)?;
+        let distances = distance_map(&depth_changes, width, height)?;
         let image = Image { width, height, border_policy: options.border_policy };
-        Plain { points, options, image, depth_changes, distances }
+        Ok(Plain { points, options, image, depth_changes, distances })
     }
 
     /// The side of a pixel's window; 0 for none.
@@ -477,7 +475,7 @@ impl<'a> Plain<'a> {
     }
 
     /// The eigenvalues of the covariance matrices of all pixels' windows.
-    fn eigenvalue_map(&self) -> Vec<[f32; 3]> {
+    fn eigenvalue_map(&self) -> Result<Vec<[f32; 3]>, Error> {
         let window = |x: usize, y: usize| {
             let side = self.window_side(x, y) as usize;
             let first = (start(x, side), start(y, side));

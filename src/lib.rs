@@ -33,6 +33,7 @@ mod error;
 mod estimator;
 mod fast;
 mod isa;
+mod memory;
 mod methods;
 mod options;
 mod orientation;

@@ -33,19 +33,21 @@ impl Workers {
         1 + self.pool.as_ref().map_or(0, ThreadPool::current_num_threads)
     }
 
-    /// Calls `work` with every part.
-    pub fn for_each_part<T: Send>(
+    /// Calls `work` once on every thread, with the parts that fall to it, as it asks for them.
+    pub fn share<T: Send>(
         &self,
         parts: impl Iterator<Item = T> + Send,
-        work: impl Fn(T) + Sync,
-    ) {
-        let parts = Mutex::new(parts);
-        let next = || parts.lock().unwrap_or_else(PoisonError::into_inner).next();
+        work: impl Fn(&mut dyn Iterator<Item = T>) -> Result<(), Error> + Sync,
+    ) -> Result<(), Error> {
+        let parts = Mutex::new((parts, Ok(())));
+        let lock = || parts.lock().unwrap_or_else(PoisonError::into_inner);
         self.for_each(self.count(), |_, _| {
-            while let Some(part) = next() {
-                work(part);
+            let done = work(&mut std::iter::from_fn(|| lock().0.next()));
+            if done.is_err() {
+                lock().1 = done;
             }
         });
+        parts.into_inner().unwrap_or_else(PoisonError::into_inner).1
     }
 
     /// Calls `work(worker, item)` for every item; no two calls run at once with the same worker.

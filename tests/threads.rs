@@ -15,10 +15,9 @@ use iine::{BorderPolicy, Error, Estimator, Isa, Method, Normals, Options};
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
-    static LARGEST: Cell<usize> = const { Cell::new(usize::MAX) };
 }
 
-/// Counts what each thread asks for, and has nothing for those who ask for more at once than their largest.
+/// Counts what each thread asks for.
 struct Counting;
 
 // SAFETY: everything is the system allocator's.
@@ -26,9 +25,6 @@ unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // A thread that ends may ask after its counter is gone.
         let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
-        if LARGEST.try_with(|largest| layout.size() > largest.get()).unwrap_or(false) {
-            return std::ptr::null_mut();
-        }
         // SAFETY: as the caller's.
         unsafe { System.alloc(layout) }
     }
@@ -234,26 +230,6 @@ fn scratch_memory_is_small_and_stays() {
                 }
             }
         }
-    }
-}
-
-#[test]
-fn memory_that_is_not_there_is_an_error() {
-    let cloud = Cloud::new(Kind::NanBlocks, 640, 480, 20);
-    let pixels = cloud.width * cloud.height;
-    let all = methods().map(|method| options(method, 10.0, true)).chain(paper_options());
-    for options in all {
-        let mut estimator = Estimator::new(options.clone());
-        let mut found = vec![[7.0; 4]; pixels];
-        // The map of the whole image takes four bytes a pixel.
-        LARGEST.set(4 * pixels - 1);
-        let result = compute_to(&mut found, &mut estimator, &cloud);
-        LARGEST.set(usize::MAX);
-        assert_eq!(result, Err(Error::OutOfMemory), "{options:?}");
-        assert!(found.as_flattened().iter().all(|c| *c == 7.0), "{options:?}: partial output");
-        let expected = compute(&mut Estimator::new(options.clone()), &cloud);
-        let what = format!("{options:?}");
-        assert_same_bits(&compute(&mut estimator, &cloud), &expected, cloud.width, &what);
     }
 }
 

@@ -6,6 +6,7 @@ use std::ops::{Deref, DerefMut};
 
 use crate::Error;
 use crate::cloud::LINE;
+use crate::memory::{bytes, resize};
 
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
@@ -41,24 +42,15 @@ impl<T> Default for Buffer<T> {
 
 impl<T: Number> Buffer<T> {
     /// Makes room for so many elements without touching those there are.
-    pub fn grow(&mut self, length: usize) {
-        let lines = (length * size_of::<T>()).div_ceil(LINE);
-        if self.lines.len() < lines {
-            self.lines.resize(lines, Line([0; LINE]));
-        }
-    }
-
-    /// As [`Buffer::grow`], if there is memory.
-    pub fn try_grow(&mut self, length: usize) -> Result<(), Error> {
-        let lines = (length * size_of::<T>()).div_ceil(LINE).saturating_sub(self.lines.len());
-        self.lines.try_reserve(lines).map_err(|_| Error::OutOfMemory)?;
-        self.grow(length);
-        Ok(())
+    pub fn grow(&mut self, length: usize) -> Result<(), Error> {
+        let bytes = length.checked_mul(size_of::<T>()).ok_or(Error::OutOfMemory)?;
+        let lines = bytes.div_ceil(LINE).max(self.lines.len());
+        resize(&mut self.lines, lines, Line([0; LINE]))
     }
 
     /// Bytes held.
     pub fn size(&self) -> usize {
-        self.lines.capacity() * LINE
+        bytes(&self.lines)
     }
 }
 

@@ -5,7 +5,8 @@ use super::buffer::Buffer;
 use super::planes::{Corners, Frame, MARGIN, Planes, sum_between};
 use super::run::OfRun;
 use super::tile::{Found, Sums};
-use crate::paper::refill;
+use crate::Error;
+use crate::memory::{bytes, make_room};
 use crate::simd::{GROUP, Groups, Simd};
 use crate::window::Image;
 
@@ -70,12 +71,17 @@ impl Sums for HalfWindows {
     const CURVATURE: bool = false;
     const PAIRS: bool = true;
 
+    fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {
+        frame.reserve_ring(1, &mut self.integrals)?;
+        make_room(&mut self.places, side + 1)
+    }
+
     fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, _origin: [f32; 3]) {
         self.pushed = frame.start_ring(1, &mut self.integrals);
     }
 
     fn size(&self) -> usize {
-        self.integrals.size() + self.places.capacity() * size_of::<Places>()
+        self.integrals.size() + bytes(&self.places)
     }
 
     #[inline(always)]
@@ -102,7 +108,8 @@ impl Sums for HalfWindows {
     }
 
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
-        refill(&mut self.places, (0..=side).map(|side| Places::of(frame, y, side)));
+        self.places.clear();
+        self.places.extend((0..=side).map(|side| Places::of(frame, y, side)));
     }
 
     #[inline(always)]

@@ -36,8 +36,8 @@ use windows::{Sweep, WindowRows, row_length, sides};
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
+use crate::memory::{bytes, make_room};
 use crate::options::{Method, Options};
-use crate::paper::refill;
 use crate::simd::{GROUP, Groups};
 use crate::smoothing_area::depth_smoothing;
 use crate::threads::Workers;
@@ -73,6 +73,7 @@ pub(crate) struct Scratch {
 #[derive(Debug, Default)]
 struct WorkerScratch {
     sweep: Sweep,
+    /// Of the tile: here it leaves its loops the registers.
     frame: Frame,
     planes: Planes,
     moments: Moments,
@@ -98,15 +99,22 @@ impl Scratch {
     /// Bytes held.
     pub fn size(&self) -> usize {
         let each = self.each.iter().map(|scratch| lock(scratch).size()).sum::<usize>();
-        self.rows.size()
-            + self.listed.capacity() * size_of::<(u32, u32)>()
-            + self.chunks.capacity() * size_of::<Chunk>()
-            + self.paper.size()
-            + each
+        self.rows.size() + bytes(&self.listed) + bytes(&self.chunks) + self.paper.size() + each
     }
 }
 
 impl WorkerScratch {
+    /// Makes room for a method's tiles with frames that are no larger, and windows of up to `side`.
+    fn reserve(&mut self, method: Method, frame: &Frame, side: usize) -> Result<(), Error> {
+        self.planes.reserve(frame)?;
+        match method {
+            Method::CovarianceMatrix => self.moments.reserve(frame, side),
+            Method::Average3DGradient => self.strips.reserve(frame, side),
+            Method::AverageDepthChange => self.half_windows.reserve(frame, side),
+            Method::Simple3DGradient => self.simple_strips.reserve(frame, side),
+        }
+    }
+
     fn size(&self) -> usize {
         self.sweep.size()
             + self.planes.size()
@@ -139,9 +147,17 @@ impl Chunk {
 }
 
 /// Reads a map's whole numbers, row by row; `row` gives those of one of the map's rows.
-fn read_map<'r>(chunks: &[Chunk], found: &mut Vec<u32>, row: impl Fn(usize) -> &'r [f32]) {
-    let places = chunks.iter().flat_map(|chunk| chunk.own.clone().map(|y| chunk.place(y)));
-    refill(found, places.flat_map(row).map(|number| *number as u32));
+fn read_map<'r>(
+    chunks: &[Chunk],
+    (width, height): (usize, usize),
+    found: &mut Vec<u32>,
+    row: impl Fn(usize) -> &'r [f32],
+) -> Result<(), Error> {
+    make_room(found, width * height)?;
+    for place in chunks.iter().flat_map(|chunk| chunk.own.clone().map(|y| chunk.place(y))) {
+        found.extend(row(place)[..width].iter().map(|number| *number as u32));
+    }
+    Ok(())
 }
 
 /// One computation.
@@ -171,15 +187,18 @@ pub(crate) fn compute(
     let whole_points = points.has_whole_points(normals);
     let job = Job { isa, points, options, image, whole_points };
 
+    for scratch in &each[..count] {
+        lock(scratch).sweep.reserve(width)?;
+    }
     let length = row_length(width);
     let mut reach = job.reach(0.0).max(*last_reach);
-    let (limit, swept) = loop {
+    let (limit, side, swept) = loop {
         share_out(height, count, reach, chunks);
         let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
-        rows.try_grow(swept * length)?;
-        let limit = job.sweep(workers, each, chunks, &mut rows[..swept * length]);
+        rows.grow(swept * length)?;
+        let [limit, side] = job.sweep(workers, each, chunks, &mut rows[..swept * length]);
         if chunks.len() == 1 || job.reach(limit) <= reach {
-            break (limit, swept);
+            break (limit, side, swept);
         }
         // Depths reach farther than in the frame before.
         reach = job.reach(DEEPER * limit);
@@ -191,6 +210,10 @@ pub(crate) fn compute(
     let per_chunk = chunks[0].own.len();
     let sides = |y: usize| sides(rows, width, chunks[y / per_chunk].place(y));
     let sink = Sink::new(normals, indices, width, listed)?;
+    let frame = Frame::largest(job.columns(reach), side as usize, width);
+    for scratch in &each[..count] {
+        lock(scratch).reserve(options.method, &frame, side as usize)?;
+    }
     if job.tiles(workers, each, reach, limit, &sides, &sink).is_err() {
         let limit = job.largest_coordinate();
         // No coordinate is beyond this limit.
@@ -209,9 +232,8 @@ pub(crate) fn compute_with_sides(
     scratch: &mut Scratch,
 ) -> Result<(), Error> {
     compute(isa, points, options, None, normals, scratch)?;
-    let width = points.width();
-    read_map(&scratch.chunks, found, |place| &sides(&scratch.rows, width, place)[..width]);
-    Ok(())
+    let size @ (width, _) = (points.width(), points.height());
+    read_map(&scratch.chunks, size, found, |place| sides(&scratch.rows, width, place))
 }
 
 /// The rows shared out to `count` sweeps. A depth change more than `reach` away decides no window, so each sweep can
@@ -254,7 +276,8 @@ impl Job<'_> {
     }
 
     // Not inlined, as the next one: profiles and the test of instruction counts tell the two by name.
-    /// Steps 1 to 3: fills the rows with sides of windows. Returns the largest magnitude of a finite depth.
+    /// Steps 1 to 3: fills the rows with sides of windows. Returns what neither the magnitude of any finite depth nor
+    /// a side is larger than.
     #[inline(never)]
     fn sweep(
         &self,
@@ -262,10 +285,10 @@ impl Job<'_> {
         each: &[Mutex<WorkerScratch>],
         chunks: &[Chunk],
         rows: &mut [Lanes],
-    ) -> f32 {
+    ) -> [f32; 2] {
         let length = row_length(self.image.width);
         let rows = Parts(rows.as_mut_ptr());
-        let limit = AtomicU32::new(0);
+        let largest = [AtomicU32::new(0), AtomicU32::new(0)];
         workers.for_each(chunks.len(), |worker, item| {
             let chunk = &chunks[item];
             let places = chunk.start * length..(chunk.start + chunk.swept.len()) * length;
@@ -274,11 +297,13 @@ impl Job<'_> {
             let sweep = &mut lock(&each[worker]).sweep;
             let task = SweepTask { job: self, chunk, rows, sweep };
             // SAFETY: the processor has the instruction set of the job.
-            let largest = unsafe { paths::run(self.isa, task) };
+            let swept = unsafe { paths::run(self.isa, task) };
             // Positive floats are in the order of their bits.
-            limit.fetch_max(largest.to_bits(), Ordering::Relaxed);
+            for (largest, swept) in largest.iter().zip(swept) {
+                largest.fetch_max(swept.to_bits(), Ordering::Relaxed);
+            }
         });
-        f32::from_bits(limit.into_inner())
+        largest.map(|bits| f32::from_bits(bits.into_inner()))
     }
 
     /// Steps 4 and 5, all tiles.
@@ -293,24 +318,14 @@ impl Job<'_> {
         sink: &Sink,
     ) -> Result<(), BeyondLimit> {
         let Image { width, height, .. } = self.image;
-        let column = 3 * size_of::<f32>()
-            + match self.options.method {
-                Method::CovarianceMatrix => Moments::COLUMN,
-                Method::Average3DGradient => Strips::<false>::COLUMN,
-                Method::AverageDepthChange => HalfWindows::COLUMN,
-                Method::Simple3DGradient => Strips::<true>::COLUMN,
-            };
-        let ring = (reach + 2).next_power_of_two();
-        let columns = (TILE_BYTES / (column * ring)).max(2 * reach).next_multiple_of(LANES);
+        let columns = self.columns(reach);
         let across = width.div_ceil(columns);
-        // Tiles of like widths.
-        let columns = width.div_ceil(across).next_multiple_of(GROUP);
         let down = height.div_ceil(TILE_ROWS);
         let rows = height.div_ceil(down);
         let beyond = AtomicBool::new(false);
         workers.for_each(across * down, |worker, item| {
             let (row, column) = (item / across * rows, item % across * columns);
-            if column >= width || beyond.load(Ordering::Relaxed) {
+            if beyond.load(Ordering::Relaxed) {
                 return;
             }
             let tile = Tile {
@@ -332,6 +347,22 @@ impl Job<'_> {
         if beyond.into_inner() { Err(BeyondLimit) } else { Ok(()) }
     }
 
+    /// Columns of a tile, if windows reach so far from their pixels.
+    fn columns(&self, reach: usize) -> usize {
+        let column = 3 * size_of::<f32>()
+            + match self.options.method {
+                Method::CovarianceMatrix => Moments::COLUMN,
+                Method::Average3DGradient => Strips::<false>::COLUMN,
+                Method::AverageDepthChange => HalfWindows::COLUMN,
+                Method::Simple3DGradient => Strips::<true>::COLUMN,
+            };
+        let bytes = column * Frame::ring(reach);
+        let columns = (TILE_BYTES / bytes).max(2 * reach).next_multiple_of(LANES);
+        // Tiles of like widths.
+        let across = self.image.width.div_ceil(columns);
+        self.image.width.div_ceil(across).next_multiple_of(GROUP)
+    }
+
     /// The largest magnitude of a finite coordinate.
     fn largest_coordinate(&self) -> f32 {
         let rows = (0..self.image.height)
@@ -340,7 +371,7 @@ impl Job<'_> {
     }
 }
 
-/// The sweeps over one chunk of rows, into the map's rows of the chunk. Gives the largest magnitude of a finite depth.
+/// The sweeps over one chunk of rows, into the map's rows of the chunk. Gives what [`Job::sweep`] returns, of them.
 struct SweepTask<'a> {
     job: &'a Job<'a>,
     chunk: &'a Chunk,
@@ -349,19 +380,19 @@ struct SweepTask<'a> {
 }
 
 impl Task for SweepTask<'_> {
-    type Output = f32;
+    type Output = [f32; 2];
 
     #[inline(always)]
-    unsafe fn run<S: Groups>(self) -> f32 {
+    unsafe fn run<S: Groups>(self) -> [f32; 2] {
         let SweepTask { job, chunk, rows, sweep } = self;
         let mut windows = WindowRows::new(job.image.width, rows);
         let swept = (chunk.swept.start, chunk.swept.len());
         // SAFETY: as the caller's.
         unsafe {
             let depths = windows.sweep_down::<S::Pair>(job.points, job.options, swept, sweep);
-            windows.sweep_up::<S::Pair>(job.points, job.options, swept, depths, sweep);
+            let side = windows.sweep_up::<S::Pair>(job.points, job.options, swept, depths, sweep);
             let [least, largest] = depths;
-            largest.max(-least).max(0.0)
+            [largest.max(-least).max(0.0), side]
         }
     }
 }

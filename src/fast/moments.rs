@@ -7,8 +7,10 @@ use super::lanes::LANES;
 use super::planes::{Corners, Frame, MARGIN, Planes, sum_between};
 use super::run::{Noted, OfRun, RUN};
 use super::tile::{Bits, Found, Sums};
+use crate::Error;
 use crate::cloud::Points;
-use crate::paper::{ROUNDING, refill};
+use crate::memory::{bytes, make_room};
+use crate::paper::ROUNDING;
 use crate::simd::{GROUP, Groups, Simd};
 use crate::window::Image;
 
@@ -93,16 +95,19 @@ impl Sums for Moments {
     const CURVATURE: bool = true;
     const PAIRS: bool = false;
 
+    fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {
+        frame.reserve_ring(CHANNELS, &mut self.integrals)?;
+        self.centered.grow(3 * frame.stride)?;
+        make_room(&mut self.places, side + 1)
+    }
+
     fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, origin: [f32; 3]) {
         self.pushed = frame.start_ring(CHANNELS, &mut self.integrals);
-        self.centered.grow(3 * frame.stride);
         self.origin = origin;
     }
 
     fn size(&self) -> usize {
-        self.integrals.size()
-            + self.centered.size()
-            + self.places.capacity() * size_of::<(Corners, f64)>()
+        self.integrals.size() + self.centered.size() + bytes(&self.places)
     }
 
     #[inline(always)]
@@ -144,7 +149,8 @@ impl Sums for Moments {
             let ends = [before, before + side as isize];
             (frame.corners(CHANNELS, y, ends, ends), 1.0 / (side * side) as f64)
         };
-        refill(&mut self.places, (0..=side).map(place));
+        self.places.clear();
+        self.places.extend((0..=side).map(place));
     }
 
     #[inline(always)]

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::arithmetic::Doubles;
 use super::buffer::{Buffer, Number};
+use crate::Error;
 use crate::cloud::Points;
 use crate::simd::{GROUP, Groups, Simd};
 
@@ -11,7 +12,7 @@ use crate::simd::{GROUP, Groups, Simd};
 pub(crate) const MARGIN: usize = GROUP;
 
 /// Where the rows and columns of a tile lie in its rings.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(crate) struct Frame {
     /// The image's columns that are held; the first is a multiple of the group.
     pub columns: Range<usize>,
@@ -24,12 +25,34 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    pub fn set(&mut self, columns: Range<usize>, rows: Range<usize>, ring: usize) {
-        debug_assert!(columns.start.is_multiple_of(GROUP));
-        self.stride = (columns.len() + 2 * MARGIN).next_multiple_of(GROUP) + MARGIN;
-        self.ring = ring.next_power_of_two();
-        self.columns = columns;
-        self.rows = rows;
+    fn new(columns: Range<usize>, rows: Range<usize>, side: usize) -> Self {
+        let stride = (columns.len() + 2 * MARGIN).next_multiple_of(GROUP) + MARGIN;
+        Frame { columns, stride, ring: Self::ring(side), rows }
+    }
+
+    /// Rows in a ring for windows of up to `side`, with those above and below.
+    pub fn ring(side: usize) -> usize {
+        (side + 2).next_power_of_two()
+    }
+
+    /// What windows of up to `side` around a tile's pixels reach, and the pixels around them.
+    pub fn around(
+        columns: &Range<usize>,
+        rows: &Range<usize>,
+        side: usize,
+        (width, height): (usize, usize),
+    ) -> Self {
+        let (before, after) = (side / 2 + 1, side.div_ceil(2));
+        let left = columns.start.saturating_sub(before) / GROUP * GROUP;
+        let right = (columns.end + after + 1).min(width);
+        let top = rows.start.saturating_sub(before);
+        let bottom = (rows.end + after).min(height);
+        Frame::new(left..right, top..bottom, side)
+    }
+
+    /// As large as any that [`Frame::around`] gives for tiles of so many columns.
+    pub fn largest(columns: usize, side: usize, width: usize) -> Self {
+        Frame::new(0..(GROUP + columns + side + 2).min(width), 0..0, side)
     }
 
     /// Groups that cover the columns.
@@ -55,11 +78,19 @@ impl Frame {
         place * planes * self.stride
     }
 
-    /// Makes room for a ring of so many planes, and after it for a row of zeros, whose place it returns: what is above
-    /// the first row that will be pushed.
+    /// Makes room for a ring of so many planes, and for a row after it.
+    pub fn reserve_ring<T: Number>(
+        &self,
+        planes: usize,
+        ring: &mut Buffer<T>,
+    ) -> Result<(), Error> {
+        ring.grow(self.start_of(planes, self.ring + 1))
+    }
+
+    /// Makes the row after a ring of so many planes one of zeros, and returns its place: it is what is above the first
+    /// row that will be pushed.
     pub fn start_ring<T: Number + Default>(&self, planes: usize, ring: &mut Buffer<T>) -> usize {
         let zeros = self.start_of(planes, self.ring)..self.start_of(planes, self.ring + 1);
-        ring.grow(zeros.end);
         ring[zeros].fill(T::default());
         self.ring
     }
@@ -119,8 +150,9 @@ pub(crate) struct RowNews {
 }
 
 impl Planes {
-    pub fn resize(&mut self, frame: &Frame) {
-        self.data.grow(3 * frame.ring * frame.stride);
+    /// Makes room for frames that are no larger.
+    pub fn reserve(&mut self, frame: &Frame) -> Result<(), Error> {
+        self.data.grow(frame.start_of(3, frame.ring))
     }
 
     pub fn size(&self) -> usize {

@@ -4,6 +4,7 @@ use super::lanes::LANES;
 use super::tile::Estimates;
 use crate::Error;
 use crate::cloud::Normals;
+use crate::memory::refill;
 use crate::simd::GROUP;
 
 /// The output of one computation.
@@ -28,9 +29,7 @@ impl<'a> Sink<'a> {
         listed: &'a mut Vec<(u32, u32)>,
     ) -> Result<Self, Error> {
         let Some(indices) = indices else { return Ok(Sink::All(normals)) };
-        listed.clear();
-        listed.try_reserve(indices.len()).map_err(|_| Error::OutOfMemory)?;
-        listed.extend(indices.iter().zip(0..).map(|(index, at)| (*index as u32, at)));
+        refill(listed, indices.iter().enumerate().map(|(at, index)| (*index as u32, at as u32)))?;
         listed.sort_unstable();
         Ok(Sink::Listed { normals, listed, width })
     }

@@ -10,7 +10,8 @@ use super::buffer::Buffer;
 use super::planes::{Corners, Frame, MARGIN, Planes};
 use super::run::OfRun;
 use super::tile::{Found, Sums};
-use crate::paper::refill;
+use crate::Error;
+use crate::memory::{bytes, make_room};
 use crate::simd::{GROUP, Groups, Simd};
 use crate::window::Image;
 
@@ -62,12 +63,17 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     const CURVATURE: bool = false;
     const PAIRS: bool = true;
 
+    fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {
+        frame.reserve_ring(3, &mut self.columns)?;
+        self.rows.grow(frame.start_of(3, frame.ring))?;
+        for row in [&mut self.last, &mut self.above] {
+            row.grow(3 * frame.stride)?;
+        }
+        make_room(&mut self.places, side + 1)
+    }
+
     fn start(&mut self, frame: &Frame, limit: f32, side: usize, _origin: [f32; 3]) {
         self.pushed = frame.start_ring(3, &mut self.columns);
-        self.rows.grow(frame.start_of(3, frame.ring));
-        for row in [&mut self.last, &mut self.above] {
-            row.grow(3 * frame.stride);
-        }
         self.last.fill(0); // it is what is above the first row
         // 4 side limit scale < 2^31, and a power of two.
         let bits = 29.0 - (f64::from(limit) * side as f64).log2();
@@ -77,7 +83,7 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     fn size(&self) -> usize {
         let Strips { columns, rows, last, above, places, .. } = self;
         let integers = [columns, rows, last, above].map(Buffer::size).into_iter().sum::<usize>();
-        integers + places.capacity() * size_of::<Places>()
+        integers + bytes(places)
     }
 
     #[inline(always)]
@@ -128,7 +134,8 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
     }
 
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
-        refill(&mut self.places, (0..=side).map(|side| Self::places(frame, y, side)));
+        self.places.clear();
+        self.places.extend((0..=side).map(|side| Self::places(frame, y, side)));
     }
 
     #[inline(always)]

@@ -8,6 +8,7 @@ use super::lanes::LANES;
 use super::planes::{Frame, MARGIN, Planes};
 use super::run::{Noted, RUN};
 use super::sink::Sink;
+use crate::Error;
 use crate::cloud::Points;
 use crate::methods::{Estimate, estimate};
 use crate::options::{BorderPolicy, Options};
@@ -56,7 +57,10 @@ pub(crate) trait Sums {
     /// Whether pairs of groups are summed as such: not where a group's sums fill the registers.
     const PAIRS: bool;
 
-    /// Makes room, and forgets the rows pushed before. `limit` bounds the coordinates, `side` the windows.
+    /// Makes room for frames that are no larger, and windows of up to `side`.
+    fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error>;
+
+    /// Forgets the rows pushed before. `limit` bounds the coordinates, `side` the windows.
     fn start(&mut self, frame: &Frame, limit: f32, side: usize, origin: [f32; 3]);
 
     /// Bytes held.
@@ -172,7 +176,8 @@ pub(crate) struct Tile<'a> {
 pub(crate) struct BeyondLimit;
 
 impl Tile<'_> {
-    /// Computes the tile's normals. `sides` gives a row's sides of windows, readable up to a whole group.
+    /// Computes the tile's normals. `sides` gives a row's sides of windows, readable up to a whole group. There is room
+    /// for the tile's frame.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`; the sink's pixels of this tile are written by no one else.
@@ -196,18 +201,13 @@ impl Tile<'_> {
             }
             return Ok(());
         }
-        let (before, after) = (side / 2 + 1, side.div_ceil(2));
-        let left = self.columns.start.saturating_sub(before) / GROUP * GROUP;
-        let right = (self.columns.end + after + 1).min(self.image.width);
-        let top = self.rows.start.saturating_sub(before);
-        let bottom = (self.rows.end + after).min(self.image.height);
-        frame.set(left..right, top..bottom, before + after + 1);
-        planes.resize(frame);
-        let origin = self.origin(sides);
-        sums.start(frame, self.limit, side, origin);
+        let size = (self.image.width, self.image.height);
+        *frame = Frame::around(&self.columns, &self.rows, side, size);
+        sums.start(frame, self.limit, side, self.origin(sides));
         let mut run = Run::default();
 
-        let mut next = top;
+        let after = side.div_ceil(2);
+        let mut next = frame.rows.start;
         let mut hidden = false;
         for y in self.rows.clone() {
             while next < (y + after + 1).min(self.image.height) {

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use super::buffer::Buffer;
 use super::lanes::{LANES, LaneOrder, Lanes};
+use crate::Error;
 use crate::cloud::Points;
 use crate::distance::{DIAGONAL, STRAIGHT, far};
 use crate::options::Options;
@@ -30,13 +31,18 @@ pub(crate) struct Sweep {
 }
 
 impl Sweep {
-    fn resize(&mut self, order: LaneOrder) {
-        let length = order.segment + 1;
-        self.z.grow(2 * length);
-        self.above.grow(length);
-        self.sides.grow(length);
+    /// Makes room for rows of so many pixels.
+    pub fn reserve(&mut self, width: usize) -> Result<(), Error> {
+        let length = LaneOrder::new(width).segment + 1;
+        self.z.grow(2 * length)?;
+        for row in [&mut self.tested, &mut self.above, &mut self.sides] {
+            row.grow(length)?;
+        }
+        Ok(())
+    }
+
+    fn start(&mut self, order: LaneOrder) {
         self.above.fill(Lanes::ZERO);
-        self.tested.grow(length);
         self.tested.fill(Lanes::ZERO);
         for x in 0..order.width - 1 {
             let (k, l) = order.place(x);
@@ -95,7 +101,7 @@ impl<'a> WindowRows<'a> {
     }
 
     /// Depth changes and the forward pass over the image's rows `first..first + count`, downwards. Returns the least
-    /// and the largest finite depth in them, infinity and -infinity if there is none.
+    /// and the largest finite depth in them, infinity and -infinity if there is none. There is room for the rows.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`, which has sixteen lanes.
@@ -109,7 +115,7 @@ impl<'a> WindowRows<'a> {
     ) -> [f32; 2] {
         let order = self.order;
         let before = first.saturating_sub(1);
-        sweep.resize(order);
+        sweep.start(order);
         let factor = options.max_depth_change_factor;
         let far = far(points.width(), points.height());
         sweep.read_z(points, order, before, before + 1);
@@ -144,7 +150,8 @@ impl<'a> WindowRows<'a> {
     }
 
     /// The backward pass upwards over the swept rows, `first` being the image's row of the first; then the rows
-    /// hold the sides of their windows. `depths` are the least and the largest finite depth.
+    /// hold the sides of their windows, none of which is larger than what is returned. `depths` are the least and the
+    /// largest finite depth.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`, which has sixteen lanes.
@@ -156,24 +163,28 @@ impl<'a> WindowRows<'a> {
         (first, count): (usize, usize),
         depths: [f32; 2],
         sweep: &mut Sweep,
-    ) {
+    ) -> f32 {
         let order = self.order;
         let far = far(points.width(), points.height());
         let smoothing = one_smoothing(depths, options);
+        let mut largest = Lanes::ZERO;
         for index in (0..count).rev() {
             if index + 1 < count {
                 let (row, below) = self.two_rows(index);
                 // SAFETY: as the caller's.
                 unsafe { backward::<S>(order, row, below, far) };
                 close_ends(row, far);
+                let y = first + index + 1;
                 // SAFETY: as the caller's.
                 unsafe {
-                    sweep.sides::<S>(points, options, smoothing, first + index + 1, order, below)
+                    sweep.sides::<S>(points, options, smoothing, y, order, below, &mut largest)
                 };
             }
         }
+        let row = self.row(0);
         // SAFETY: as the caller's.
-        unsafe { sweep.sides::<S>(points, options, smoothing, first, order, self.row(0)) };
+        unsafe { sweep.sides::<S>(points, options, smoothing, first, order, row, &mut largest) };
+        largest.0.into_iter().fold(0.0, f32::max)
     }
 }
 
@@ -275,11 +286,13 @@ impl Sweep {
         }
     }
 
-    /// Replaces a row's distances by the sides of its windows, pixel by pixel. `smoothing` as [`one_smoothing`] says.
+    /// Replaces a row's distances by the sides of its windows, pixel by pixel, and keeps the `largest`. `smoothing` as
+    /// [`one_smoothing`] says.
     ///
     /// # Safety
     /// As [`Sweep::start_row`].
     #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
     unsafe fn sides<S: Simd>(
         &mut self,
         points: &Points,
@@ -288,6 +301,7 @@ impl Sweep {
         y: usize,
         order: LaneOrder,
         row: &mut [Lanes],
+        largest: &mut Lanes,
     ) {
         let segment = order.segment;
         if smoothing.is_none() {
@@ -302,18 +316,24 @@ impl Sweep {
                 let whole = S::truncate(S::min(smallest, S::splat(LARGEST)));
                 S::and(S::lt(S::splat(SMALLEST), smallest), whole)
             };
+            let mut so_far = largest.load::<S>();
             if let Some(smoothing) = smoothing {
                 let smoothing = S::splat(smoothing);
                 for k in 0..segment {
-                    sides[k].store::<S>(side(distances[k].load::<S>(), smoothing));
+                    let side = side(distances[k].load::<S>(), smoothing);
+                    so_far = S::max(side, so_far);
+                    sides[k].store::<S>(side);
                 }
             } else {
                 let (size, ten) = (S::splat(options.normal_smoothing_size), S::splat(10.0));
                 for k in 0..segment {
                     let smoothing = S::add(size, S::div(z[k].load::<S>(), ten));
-                    sides[k].store::<S>(side(distances[k].load::<S>(), smoothing));
+                    let side = side(distances[k].load::<S>(), smoothing);
+                    so_far = S::max(side, so_far);
+                    sides[k].store::<S>(side);
                 }
             }
+            largest.store::<S>(so_far);
         }
         let row = floats_mut(row);
         order.write(&self.sides, row);
@@ -530,18 +550,19 @@ mod tests {
                     depth_dependent_smoothing: seed % 2 == 0,
                     ..Options::default()
                 };
-                let changes = depth_change_map(&points, options.max_depth_change_factor);
-                let distances = distance_map(&changes, width, height);
+                let changes = depth_change_map(&points, options.max_depth_change_factor).unwrap();
+                let distances = distance_map(&changes, width, height).unwrap();
 
                 let mut rows = vec![Lanes::ZERO; row_length(width) * height];
                 let mut windows = WindowRows::new(width, &mut rows);
                 let mut sweep = Sweep::default();
+                sweep.reserve(width).unwrap();
                 let swept = (0, height);
                 // SAFETY: the portable path runs everywhere.
-                unsafe {
+                let largest = unsafe {
                     let depths = windows.sweep_down::<S>(&points, &options, swept, &mut sweep);
-                    windows.sweep_up::<S>(&points, &options, swept, depths, &mut sweep);
-                }
+                    windows.sweep_up::<S>(&points, &options, swept, depths, &mut sweep)
+                };
                 for y in 0..height {
                     for x in 0..width {
                         let expected =
@@ -551,6 +572,7 @@ mod tests {
                             expected as f32,
                             "{width}x{height} {x},{y}"
                         );
+                        assert!(expected as f32 <= largest);
                     }
                 }
             }

@@ -51,7 +51,7 @@ impl EvenWindows<'_> {
     }
 
     /// The block whose window each pixel takes, if there is one: the plain form.
-    pub fn choices(&self) -> impl Iterator<Item = Option<u32>> {
+    pub fn choices(&self) -> impl ExactSizeIterator<Item = Option<u32>> {
         let can_take = |pixel: usize| {
             self.asked.levels[self.asked.blocks.block(pixel)] > 0 && !self.cloud.is_missing(pixel)
         };

@@ -1,8 +1,9 @@
 //! The organized cloud with its depths; every way of being missing has become NaN.
 
 use super::rect::Rect;
-use super::refill;
+use crate::Error;
 use crate::cloud::Points;
+use crate::memory::{bytes, make_room, refill};
 use crate::methods::is_finite;
 use crate::options::{Depth, Options, Semantics};
 
@@ -16,30 +17,30 @@ pub(crate) struct Cloud {
 }
 
 impl Cloud {
-    pub fn new(points: &Points, options: &Options) -> Self {
+    pub fn new(points: &Points, options: &Options) -> Result<Self, Error> {
         let mut cloud = Cloud::default();
-        cloud.read(points, options);
-        cloud
+        cloud.read(points, options)?;
+        Ok(cloud)
     }
 
     /// Becomes another cloud.
-    pub fn read(&mut self, points: &Points, options: &Options) {
+    pub fn read(&mut self, points: &Points, options: &Options) -> Result<(), Error> {
         let (width, height) = (points.width(), points.height());
         (self.width, self.height) = (width, height);
         let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
         // Row by row: of an iterator over both, the vector would not know how long it is.
-        self.points.clear();
+        make_room(&mut self.points, width * height)?;
         for y in 0..height {
             self.points.extend((0..width).map(|x| cleaned.at(x, y)));
         }
         let range = options.semantics == Semantics::Paper && options.paper.depth == Depth::Range;
         let depth = |&[x, y, z]: &[f32; 3]| if range { (x * x + y * y + z * z).sqrt() } else { z };
-        refill(&mut self.depths, self.points.iter().map(depth));
+        refill(&mut self.depths, self.points.iter().map(depth))
     }
 
     /// Bytes held.
     pub fn size(&self) -> usize {
-        self.points.capacity() * size_of::<[f32; 3]>() + self.depths.capacity() * size_of::<f32>()
+        bytes(&self.points) + bytes(&self.depths)
     }
 
     pub fn index(&self, x: usize, y: usize) -> usize {

@@ -3,6 +3,7 @@
 use super::blocks::{BLOCK, Blocks};
 use super::rect::Rect;
 use super::summed_area::SummedArea;
+use crate::Error;
 
 /// Integral images of the first pass' normals, block by block.
 #[derive(Debug, Default)]
@@ -12,7 +13,7 @@ pub(crate) struct SummedNormals {
 
 impl SummedNormals {
     /// Sums other normals.
-    pub fn sum(&mut self, estimates: &[[f32; 4]], blocks: &Blocks) {
+    pub fn sum(&mut self, estimates: &[[f32; 4]], blocks: &Blocks) -> Result<(), Error> {
         self.sums.sum_up(blocks.across, blocks.down, |place| {
             let mut sum = [0.0; 4];
             for at in blocks.pixels(place) {
@@ -24,7 +25,7 @@ impl SummedNormals {
                 }
             }
             sum
-        });
+        })
     }
 
     /// Bytes held.

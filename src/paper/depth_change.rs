@@ -8,12 +8,15 @@
 //! structured light sensor's shadow, as wide as the disparity it hides, is always found so.) Such a change lies at
 //! the end of the gap.
 
+use std::iter::repeat_n;
 use std::ops::Range;
 
 use super::cloud::Cloud;
 use super::distance::least_steps;
 use super::planes::{JITTER, Plane, inverse_depth};
 use super::rect::Rect;
+use crate::Error;
+use crate::memory::table;
 
 /// Where there are depth changes, row by row.
 pub(crate) struct DepthChanges {
@@ -28,12 +31,12 @@ pub(crate) struct DepthChanges {
 impl DepthChanges {
     /// The changes of a cloud: `is_change(depth, difference, gap)` says whether a difference in depth to the
     /// neighbour `gap` pixels to the right or below is one; no NaN is.
-    pub fn find(cloud: &Cloud, is_change: impl Fn(f32, f32, usize) -> bool) -> Self {
+    pub fn find(cloud: &Cloud, is_change: impl Fn(f32, f32, usize) -> bool) -> Result<Self, Error> {
         let (width, height) = (cloud.width, cloud.height);
-        let mut right = vec![false; width * height];
-        let mut below = vec![false; width * height];
+        let mut right = table(repeat_n(false, width * height))?;
+        let mut below = table(repeat_n(false, width * height))?;
         // The last finite depth of the row, and of every column, and where it was; the first are compared with NaN.
-        let mut lowest = vec![(0, f32::NAN); width];
+        let mut lowest = table(repeat_n((0, f32::NAN), width))?;
         for y in 0..height {
             let mut last = (0, f32::NAN);
             let first = y * width;
@@ -52,17 +55,17 @@ impl DepthChanges {
                 (last, lowest[x]) = ((x, *depth), (y, *depth));
             }
         }
-        DepthChanges { width, height, right, below }
+        Ok(DepthChanges { width, height, right, below })
     }
 
     /// The paper's C.
-    pub fn map(&self) -> Vec<bool> {
-        self.right.iter().zip(&self.below).map(|(right, below)| *right || *below).collect()
+    pub fn map(&self) -> Result<Vec<bool>, Error> {
+        table(self.right.iter().zip(&self.below).map(|(right, below)| *right || *below))
     }
 
     /// Without the changes that the slope of the surface on both sides explains: on a steep surface neighbours are
     /// as far apart as across an edge.
-    pub fn not_explained(&self, cloud: &Cloud) -> DepthChanges {
+    pub fn not_explained(&self, cloud: &Cloud) -> Result<DepthChanges, Error> {
         /// How far the surface is looked at along and across a change, in pixels.
         const ALONG: usize = 5;
         const ACROSS: usize = 2;
@@ -96,17 +99,18 @@ impl DepthChanges {
         };
         let left = |axis: usize, changes: &[bool]| {
             let is_left = |(at, change): (usize, &bool)| *change && !is_explained(axis, at);
-            changes.iter().enumerate().map(is_left).collect()
+            table(changes.iter().enumerate().map(is_left))
         };
-        DepthChanges { width, height, right: left(0, &self.right), below: left(1, &self.below) }
+        let (right, below) = (left(0, &self.right)?, left(1, &self.below)?);
+        Ok(DepthChanges { width, height, right, below })
     }
 
     /// The largest radius around every pixel, row by row, of a window in which no two neighbours are a depth change
     /// apart; more than any image has if there is no change.
-    pub fn clean_radii(&self) -> Vec<u32> {
+    pub fn clean_radii(&self) -> Result<Vec<u32>, Error> {
         let Self { width, height, .. } = *self;
         // The pixels that have a change among those next to them: the radius is the chessboard distance from them.
-        let mut spoilt = vec![false; width * height];
+        let mut spoilt = table(repeat_n(false, width * height))?;
         let mut spoil = |columns: Range<usize>, rows: Range<usize>| {
             for y in rows {
                 spoilt[y * width..][columns.clone()].fill(true);

@@ -1,5 +1,9 @@
 //! Step 2: the distance transform map (the paper's T): how far the nearest depth change is, in pixels.
 
+use std::iter::repeat_n;
+
+use crate::Error;
+use crate::memory::table;
 use crate::options::DistanceMetric;
 
 /// The distance map of a depth change map; infinite everywhere if there is no change.
@@ -8,7 +12,7 @@ pub(crate) fn distance_map(
     width: usize,
     height: usize,
     metric: DistanceMetric,
-) -> Vec<f32> {
+) -> Result<Vec<f32>, Error> {
     match metric {
         DistanceMetric::Euclidean => euclidean(changes, width, height),
         DistanceMetric::Chamfer => chamfer(changes, width, height),
@@ -17,10 +21,10 @@ pub(crate) fn distance_map(
 
 /// Exact, in linear time (Meijster, Roerdink and Hesselink, *A General Algorithm for Computing Distance Transforms in
 /// Linear Time*, 2000): distances along the columns, then for every row the lower envelope of their parabolas.
-fn euclidean(changes: &[bool], width: usize, height: usize) -> Vec<f32> {
+fn euclidean(changes: &[bool], width: usize, height: usize) -> Result<Vec<f32>, Error> {
     // Farther than any pixel, with a square that still fits.
     let far = (width + height) as i64;
-    let mut columns = vec![far; width * height];
+    let mut columns = table(repeat_n(far, width * height))?;
     for at in 0..width * height {
         if changes[at] {
             columns[at] = 0;
@@ -32,9 +36,10 @@ fn euclidean(changes: &[bool], width: usize, height: usize) -> Vec<f32> {
         columns[at] = columns[at].min(columns[at + width] + 1);
     }
 
-    let mut map = vec![f32::INFINITY; width * height];
+    let mut map = table(repeat_n(f32::INFINITY, width * height))?;
     // The parabolas of the envelope: their columns, and from which column on each is the lowest.
-    let mut envelope: Vec<(i64, i64)> = Vec::with_capacity(width);
+    let mut envelope: Vec<(i64, i64)> = Vec::new();
+    envelope.try_reserve(width)?;
     for (row, distances) in columns.chunks_exact(width).zip(map.chunks_exact_mut(width)) {
         let height_at = |x: i64, i: i64| (x - i) * (x - i) + row[i as usize] * row[i as usize];
         envelope.clear();
@@ -61,17 +66,17 @@ fn euclidean(changes: &[bool], width: usize, height: usize) -> Vec<f32> {
             end = end.min(from);
         }
     }
-    map
+    Ok(map)
 }
 
 /// Steps with weights 3 and 4 (Borgefors, *Distance Transformations in Digital Images*, 1986), over 3.
-fn chamfer(changes: &[bool], width: usize, height: usize) -> Vec<f32> {
+fn chamfer(changes: &[bool], width: usize, height: usize) -> Result<Vec<f32>, Error> {
     const STRAIGHT: u32 = 3;
     const DIAGONAL: u32 = 4;
     let pixels = |value: u32| {
         if value >= FAR { f32::INFINITY } else { value as f32 / STRAIGHT as f32 }
     };
-    least_steps(changes, width, height, STRAIGHT, DIAGONAL).into_iter().map(pixels).collect()
+    table(least_steps(changes, width, height, STRAIGHT, DIAGONAL)?.into_iter().map(pixels))
 }
 
 /// What [`least_steps`] gives where there is no pixel to come from, or more.
@@ -85,8 +90,8 @@ pub(crate) fn least_steps(
     height: usize,
     straight: u32,
     diagonal: u32,
-) -> Vec<u32> {
-    let mut map: Vec<u32> = starts.iter().map(|&start| if start { 0 } else { FAR }).collect();
+) -> Result<Vec<u32>, Error> {
+    let mut map = table(starts.iter().map(|&start| if start { 0 } else { FAR }))?;
     let step = |to: &mut u32, from: u32, weight: u32| *to = (*to).min(from + weight);
     let from_next_row = |row: &mut [u32], next: &[u32]| {
         row.iter_mut().zip(next).for_each(|(to, from)| step(to, *from, straight));
@@ -113,7 +118,7 @@ pub(crate) fn least_steps(
             step(&mut row[x - 1], from, straight);
         }
     }
-    map
+    Ok(map)
 }
 
 #[cfg(test)]
@@ -133,7 +138,7 @@ mod tests {
             .take(60)
         {
             let changes = changes(width, height, seed + width);
-            let found = euclidean(&changes, width, height);
+            let found = euclidean(&changes, width, height).unwrap();
             for at in 0..width * height {
                 let squared = (0..width * height)
                     .filter(|other| changes[*other])
@@ -152,9 +157,9 @@ mod tests {
     fn chamfer_distances_are_within_eight_percent() {
         let (width, height) = (64, 48);
         let changes = changes(width, height, 1);
-        let pairs =
-            euclidean(&changes, width, height).into_iter().zip(chamfer(&changes, width, height));
-        for (exact, chamfer) in pairs {
+        let [exact, chamfer] =
+            [euclidean, chamfer].map(|map| map(&changes, width, height).unwrap());
+        for (exact, chamfer) in exact.into_iter().zip(chamfer) {
             assert!((chamfer - exact).abs() <= 0.081 * exact, "{chamfer} for {exact}");
         }
     }

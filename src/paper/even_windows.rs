@@ -4,10 +4,14 @@
 //! A pixel beside a depth change or a crease is in the middle of no large window that lies on one surface, but it is
 //! at the edge or in the corner of some, which are the even windows of blocks nearby.
 
+use std::iter::repeat_n;
+
 use super::blocks::{BLOCK, Blocks};
 use super::cloud::Cloud;
 use super::planes::Plane;
 use super::rect::Rect;
+use crate::Error;
+use crate::memory::table;
 
 /// Inverse depths that deviate less than this many alpha from a plane are as good as in it.
 const EVEN: f32 = 0.02;
@@ -85,12 +89,12 @@ impl Asked<'_> {
     }
 
     /// Whether some pixel can take a block's window, block by block.
-    pub fn needed(&self) -> Vec<bool> {
-        let mut needed = vec![false; self.blocks.count()];
+    pub fn needed(&self) -> Result<Vec<bool>, Error> {
+        let mut needed = table(repeat_n(false, self.blocks.count()))?;
         for block in (0..needed.len()).filter(|block| self.levels[*block] > 0) {
             self.for_each_place(block, |place| needed[place] = true);
         }
-        needed
+        Ok(needed)
     }
 
     /// The variance told from none where the sensor's smallest depth change is `alpha`.
@@ -115,7 +119,7 @@ pub(crate) fn even_windows<'a>(
     cloud: &'a Cloud,
     asked: &'a Asked,
     needed: &'a [bool],
-) -> impl Iterator<Item = EvenWindow> + 'a {
+) -> impl ExactSizeIterator<Item = EvenWindow> + 'a {
     let window = move |(block, needed): (_, &bool)| {
         needed.then(|| even_window(cloud, asked, block)).flatten().unwrap_or_default()
     };

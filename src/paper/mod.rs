@@ -38,8 +38,10 @@ use std::iter::once;
 
 use depth_change::DepthChanges;
 
+use crate::Error;
 use crate::cloud::Points;
 use crate::eigenvalues::eigenvalue_map;
+use crate::memory::table;
 use crate::methods::Estimate;
 use crate::options::{Options, Semantics};
 
@@ -56,18 +58,18 @@ pub(crate) struct PaperMaps {
 }
 
 impl PaperMaps {
-    pub fn new(points: &Points, options: &Options) -> Self {
-        let cloud = Cloud::new(points, options);
+    pub fn new(points: &Points, options: &Options) -> Result<Self, Error> {
+        let cloud = Cloud::new(points, options)?;
         let paper = &options.paper;
-        let depth_changes = depth_changes(&cloud, options).map();
+        let depth_changes = depth_changes(&cloud, options)?.map()?;
         let distances = distance::distance_map(
             &depth_changes,
             cloud.width,
             cloud.height,
             paper.distance_metric,
-        );
-        let depth_radii: Vec<f32> =
-            cloud.depths.iter().map(|depth| smoothing_area::depth_radius(*depth, paper)).collect();
+        )?;
+        let depth_radius = |depth: &f32| smoothing_area::depth_radius(*depth, paper);
+        let depth_radii = table(cloud.depths.iter().map(depth_radius))?;
         let radius = |(&radius, &distance): (&f32, &f32)| {
             if radius.is_nan() {
                 0.0
@@ -75,12 +77,12 @@ impl PaperMaps {
                 smoothing_area::smoothing_radius(radius, distance, paper)
             }
         };
-        let smoothing_radii = depth_radii.iter().zip(&distances).map(radius).collect();
-        PaperMaps { depth_radii, depth_changes, distances, smoothing_radii }
+        let smoothing_radii = table(depth_radii.iter().zip(&distances).map(radius))?;
+        Ok(PaperMaps { depth_radii, depth_changes, distances, smoothing_radii })
     }
 
     /// The eigenvalues of the covariance matrices of all pixels' windows.
-    pub fn eigenvalue_map(&self, points: &Points) -> Vec<[f32; 3]> {
+    pub fn eigenvalue_map(&self, points: &Points) -> Result<Vec<[f32; 3]>, Error> {
         let (width, height) = (points.width(), points.height());
         let window = |x: usize, y: usize| {
             let radius = self.smoothing_radii[y * width + x] as usize;
@@ -92,8 +94,11 @@ impl PaperMaps {
 }
 
 /// The points, row by row, with NaN for every missing one.
-pub(crate) fn with_missing_as_nan(points: &Points, options: &Options) -> Vec<[f32; 3]> {
-    Cloud::new(points, options).points
+pub(crate) fn with_missing_as_nan(
+    points: &Points,
+    options: &Options,
+) -> Result<Vec<[f32; 3]>, Error> {
+    Ok(Cloud::new(points, options)?.points)
 }
 
 /// The estimate of a pixel from the part of a window of any `size` that lies inside the image, not turned.
@@ -111,7 +116,7 @@ pub(crate) fn estimate_window(
     methods::estimate(options.method, &cleaned, &rect)
 }
 
-fn depth_changes(cloud: &Cloud, options: &Options) -> DepthChanges {
+fn depth_changes(cloud: &Cloud, options: &Options) -> Result<DepthChanges, Error> {
     DepthChanges::find(cloud, |depth, difference, gap| {
         is_depth_change(depth, difference, gap, options)
     })
@@ -123,12 +128,6 @@ fn is_depth_change(depth: f32, difference: f32, gap: usize, options: &Options) -
         Semantics::Paper => smoothing_area::is_depth_change(depth, difference, gap, &options.paper),
         Semantics::Pcl => difference.abs() > least_depth_change(depth, options) * gap as f32,
     }
-}
-
-/// Puts other values into a table that is kept from frame to frame.
-pub(crate) fn refill<T>(table: &mut Vec<T>, values: impl Iterator<Item = T>) {
-    table.clear();
-    table.extend(values);
 }
 
 /// The difference in depth between neighbours that is a depth change.

@@ -8,10 +8,9 @@ use super::cloud::Cloud;
 use super::creases::SummedNormals;
 use super::even_windows::{Asked, EvenWindow};
 use super::rect::Rect;
-use super::{
-    depth_changes, is_depth_change, rect_around, refill, smoothing_area, surroundings, window,
-};
+use super::{depth_changes, is_depth_change, rect_around, smoothing_area, surroundings, window};
 use crate::Error;
+use crate::memory::{bytes, refill};
 use crate::methods::Estimate;
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
@@ -101,33 +100,39 @@ impl SecondPass {
             return Ok(&self.estimates);
         }
         let blocks = Blocks::of(cloud.width, cloud.height);
-        self.concern(cloud, &blocks, options, engine.workers());
+        self.concern(cloud, &blocks, options, engine.workers())?;
         let SecondPass { wanted, levels, windows, choices, taken, second, .. } = self;
-        let clean = depth_changes(cloud, options).not_explained(cloud).clean_radii();
+        let clean = depth_changes(cloud, options)?.not_explained(cloud)?.clean_radii()?;
         let least_noise = Asked::least_noise(options.paper.alpha);
         let limit = options.paper.largest_radius;
         let asked = Asked { blocks, wanted, levels, clean: &clean, limit, least_noise };
-        engine.even_windows(cloud, &asked, &asked.needed(), windows)?;
+        engine.even_windows(cloud, &asked, &asked.needed()?, windows)?;
         let even = EvenWindows { cloud, asked: &asked, options, windows };
         engine.choices(&even, choices)?;
-        refill(taken, repeat_n(0, blocks.count()));
+        refill(taken, repeat_n(0, blocks.count()))?;
         for block in choices.iter().flatten().map(|block| *block as usize) {
             taken[block] = even.radius(block);
         }
         engine.of_blocks(&blocks, taken, second)?;
-        self.replace(cloud, options, engine.workers());
+        self.replace(cloud, options, engine.workers())?;
         Ok(&self.estimates)
     }
 
     /// Finds the pixels that another window may serve better than their own.
-    fn concern(&mut self, cloud: &Cloud, blocks: &Blocks, options: &Options, workers: &Workers) {
+    fn concern(
+        &mut self,
+        cloud: &Cloud,
+        blocks: &Blocks,
+        options: &Options,
+        workers: &Workers,
+    ) -> Result<(), Error> {
         let SecondPass { estimates, sizes, wanted, concerned, levels, normals, .. } = self;
         if options.crease_windows {
-            normals.sum(estimates, blocks);
+            normals.sum(estimates, blocks)?;
         }
-        refill(concerned, repeat_n(false, sizes.len()));
-        refill(wanted, repeat_n(0, blocks.count()));
-        refill(levels, repeat_n(0, blocks.count()));
+        refill(concerned, repeat_n(false, sizes.len()))?;
+        refill(wanted, repeat_n(0, blocks.count()))?;
+        refill(levels, repeat_n(0, blocks.count()))?;
         let (estimates, sizes, normals) = (&*estimates, &*sizes, &*normals);
         // The window and the level of a block; marks its pixels, of which `concerned` starts with number `first`.
         let concern = |pixels: [usize; BLOCK * BLOCK], first: usize, concerned: &mut [bool]| {
@@ -154,16 +159,24 @@ impl SecondPass {
         };
         let rows = concerned.chunks_mut(BLOCK * cloud.width).enumerate();
         let of_blocks = wanted.chunks_mut(blocks.across).zip(levels.chunks_mut(blocks.across));
-        workers.for_each_part(rows.zip(of_blocks), |((row, concerned), (wanted, levels))| {
-            for (column, (wanted, level)) in wanted.iter_mut().zip(levels).enumerate() {
-                let pixels = blocks.pixels((column, row));
-                (*wanted, *level) = concern(pixels, row * BLOCK * cloud.width, concerned);
+        workers.share(rows.zip(of_blocks), |share| {
+            for ((row, concerned), (wanted, levels)) in share {
+                for (column, (wanted, level)) in wanted.iter_mut().zip(levels).enumerate() {
+                    let pixels = blocks.pixels((column, row));
+                    (*wanted, *level) = concern(pixels, row * BLOCK * cloud.width, concerned);
+                }
             }
-        });
+            Ok(())
+        })
     }
 
     /// Gives the pixels concerned the estimates of the windows that they take.
-    fn replace(&mut self, cloud: &Cloud, options: &Options, workers: &Workers) {
+    fn replace(
+        &mut self,
+        cloud: &Cloud,
+        options: &Options,
+        workers: &Workers,
+    ) -> Result<(), Error> {
         let SecondPass { estimates, concerned, choices, second, .. } = self;
         let replace = |at: usize, estimate: &mut [f32; 4]| {
             let around = || {
@@ -185,22 +198,21 @@ impl SecondPass {
             let normal = turn_to_viewpoint([x, y, z], cloud.points[at], options.viewpoint);
             *estimate = Estimate { normal, curvature }.into();
         };
-        workers.for_each_part(estimates.chunks_mut(cloud.width).enumerate(), |(row, estimates)| {
-            for (at, estimate) in (row * cloud.width..).zip(estimates) {
-                if concerned[at] {
-                    replace(at, estimate);
+        let rows = estimates.chunks_mut(cloud.width).enumerate();
+        workers.share(rows, |share| {
+            for (row, estimates) in share {
+                for (at, estimate) in (row * cloud.width..).zip(estimates) {
+                    if concerned[at] {
+                        replace(at, estimate);
+                    }
+                    if options.method != Method::CovarianceMatrix {
+                        estimate[3] = f32::NAN;
+                    }
                 }
             }
-        });
-        if options.method != Method::CovarianceMatrix {
-            estimates.iter_mut().for_each(|estimate| estimate[3] = f32::NAN);
-        }
+            Ok(())
+        })
     }
-}
-
-/// Bytes that a table holds.
-fn bytes<T>(table: &Vec<T>) -> usize {
-    table.capacity() * size_of::<T>()
 }
 
 /// The size that the window of a pixel has far from any depth change, as [`Engine::windows`] gives them; 0 at a

@@ -3,7 +3,8 @@
 use std::iter::repeat_n;
 
 use super::rect::Rect;
-use super::refill;
+use crate::Error;
+use crate::memory::{bytes, refill};
 
 /// What rounding on the path to a sum may gather, in units of the largest sum on it.
 pub(crate) const ROUNDING: f64 = 4.0 * f64::EPSILON;
@@ -22,10 +23,10 @@ impl<const N: usize> SummedArea<N> {
         width: usize,
         height: usize,
         value: impl Fn((usize, usize)) -> [f64; N],
-    ) {
+    ) -> Result<(), Error> {
         let stride = width + 1;
         self.stride = stride;
-        refill(&mut self.sums, repeat_n([0.0; N], stride * (height + 1)));
+        refill(&mut self.sums, repeat_n([0.0; N], stride * (height + 1)))?;
         for y in 0..height {
             let (above, row) = self.sums[y * stride..].split_at_mut(stride);
             let mut along = [0.0; N];
@@ -37,11 +38,12 @@ impl<const N: usize> SummedArea<N> {
                 }
             }
         }
+        Ok(())
     }
 
     /// Bytes held.
     pub fn size(&self) -> usize {
-        self.sums.capacity() * size_of::<[f64; N]>()
+        bytes(&self.sums)
     }
 
     /// The sum over a rectangle (Eq. 3, not divided).

@@ -1,43 +1,56 @@
-//! Which even window each pixel takes, fast, for one row of blocks: the plain form is in `paper::choices`. As many of the
+//! Which even window each pixel takes, fast, for rows of blocks: the plain form is in `paper::choices`. As many of the
 //! blocks concerned as there are lanes form a group: the windows at one place of each are gathered together, and weighed
 //! for a pixel of each at a time.
 
+use std::iter::repeat_n;
+
+use crate::Error;
 use crate::fast::arithmetic::Floats;
 use crate::fast::lanes::{LANES, Lanes};
 use crate::fast::tile::Bits;
+use crate::memory::{make_room, refill};
 use crate::paper::{
     BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows, JITTER,
     MIDDLE, MISFIT, NEAR, NEAR_NOISE, PLACES, REACH, inverse_depth,
 };
 use crate::simd::{GROUP, Groups, Simd};
 
-/// Finds the choices of the pixels of a row of blocks, which are none so far.
+/// Finds the choices of the pixels of some rows of blocks, which are none so far.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-pub(super) unsafe fn row<S: Groups>(even: &EvenWindows, row: usize, choices: &mut [Option<u32>]) {
+pub(super) unsafe fn rows<S: Groups>(
+    even: &EvenWindows,
+    rows: &mut dyn Iterator<Item = (usize, &mut [Option<u32>])>,
+) -> Result<(), Error> {
     let Blocks { across, .. } = even.asked.blocks;
-    let levels = &even.asked.levels[row * across..][..across];
-    let concerned: Vec<usize> = (0..across).filter(|block| levels[*block] > 0).collect();
-    let neighbours = Neighbours::new(even.cloud, row, &concerned);
+    let mut concerned = Vec::new();
+    let mut neighbours = Neighbours::default();
     // SAFETY: as the caller's.
     let noise = unsafe { Floats::<S::Widest>::splat(0.0) };
     let mut found = Found { candidates: Vec::new(), number: 0, noise, exact: noise.0 };
     let lanes = S::Widest::LANES;
-    for (number, blocks) in concerned.chunks(lanes).enumerate() {
-        let group = Group { even, row, first: number * lanes, blocks };
-        // SAFETY: as the caller's.
-        unsafe {
-            group.candidates::<S::Widest, S>(&mut found);
-            found.weigh(even.asked.least_noise);
-            for (y, choices) in choices.chunks_mut(even.cloud.width).enumerate() {
-                for x in 0..BLOCK {
-                    group.choose(&mut found, &neighbours, [x, y], choices);
+    for (row, choices) in rows {
+        let levels = &even.asked.levels[row * across..][..across];
+        make_room(&mut concerned, across)?;
+        concerned.extend((0..across).filter(|block| levels[*block] > 0));
+        neighbours.read(even.cloud, row, &concerned)?;
+        for (number, blocks) in concerned.chunks(lanes).enumerate() {
+            let group = Group { even, row, first: number * lanes, blocks };
+            // SAFETY: as the caller's.
+            unsafe {
+                group.candidates::<S::Widest, S>(&mut found)?;
+                found.weigh(even.asked.least_noise);
+                for (y, choices) in choices.chunks_mut(even.cloud.width).enumerate() {
+                    for x in 0..BLOCK {
+                        group.choose(&mut found, &neighbours, [x, y], choices);
+                    }
                 }
             }
         }
     }
+    Ok(())
 }
 
 /// Blocks of a row whose pixels can take windows, as many as there are lanes, or the last ones.
@@ -184,12 +197,13 @@ impl<S: Simd> Found<S> {
         columns: &Lines<S>,
         rows: &Lines<S>,
         may_take: S::F,
-    ) {
+    ) -> Result<(), Error> {
         const { assert!(FIELDS == 8) };
         let place = |lane: usize| columns.first[lane] + rows.first[lane];
         debug_assert!((0..S::LANES).all(|lane| place(lane) < windows.len()));
         let windows = windows.as_ptr();
         if self.number == self.candidates.len() {
+            self.candidates.try_reserve(1)?;
             // SAFETY: as the caller's.
             self.candidates.push(unsafe { Candidates::none() });
         }
@@ -218,6 +232,7 @@ impl<S: Simd> Found<S> {
                 }
             }
         }
+        Ok(())
     }
 
     /// Finds what the windows cost any pixel: all have been added.
@@ -270,7 +285,10 @@ impl Group<'_> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn candidates<S: Simd, G: Groups<Widest = S>>(&self, found: &mut Found<S>) {
+    unsafe fn candidates<S: Simd, G: Groups<Widest = S>>(
+        &self,
+        found: &mut Found<S>,
+    ) -> Result<(), Error> {
         let &Group { even, row, blocks, .. } = self;
         let Blocks { across, down, .. } = even.asked.blocks;
         let &Cloud { width, height, .. } = even.cloud;
@@ -296,7 +314,7 @@ impl Group<'_> {
             let columns = Axis { pixels: width, blocks: across, number: 1 };
             let rows = Axis { pixels: height, blocks: down, number: across };
             let own = [columns.lines::<S>(column, column), rows.lines(row, row)];
-            found.add::<G>(even.windows, &own[0], &own[1], takes_any);
+            found.add::<G>(even.windows, &own[0], &own[1], takes_any)?;
             loop {
                 let may_take = S::and(S::lt(zero.0, radii.0), S::lt(S::splat(level), levels));
                 if S::bits(may_take) == 0 {
@@ -311,12 +329,13 @@ impl Group<'_> {
                 let across = [&left, &own[0], &right];
                 let down = [&above, &own[1], &below];
                 for (column, row) in PLACES {
-                    found.add::<G>(even.windows, across[column], down[row], may_take);
+                    found.add::<G>(even.windows, across[column], down[row], may_take)?;
                 }
                 radii = Floats(S::truncate((radii * Floats::splat(0.5)).0));
                 level += 1.0;
             }
         }
+        Ok(())
     }
 
     /// Of the windows `found`, those that are worth most to the blocks' pixels in this column and row of theirs, for
@@ -444,21 +463,25 @@ impl Axis {
 }
 
 /// The inverse depths of blocks of a row, and of the pixels around them.
+#[derive(Default)]
 struct Neighbours {
     /// Row by row and column by column of those pixels, so many of each, block by block; NaN outside the image.
     inverse_depths: Vec<f32>,
     blocks: usize,
+    /// A row of the image, with a column before it, and room behind it for the last block.
+    inverse: Vec<f32>,
 }
 
 /// Rows and columns of a block's pixels and those around it.
 const AROUND: usize = BLOCK + 2;
 
 impl Neighbours {
-    fn new(cloud: &Cloud, row: usize, blocks: &[usize]) -> Self {
-        let length = blocks.len().next_multiple_of(LANES);
-        let mut inverse_depths = vec![f32::NAN; AROUND * AROUND * length];
-        // With a column before the image, and room behind it for the last block.
-        let mut inverse = vec![f32::NAN; cloud.width + AROUND];
+    /// Becomes those of other blocks.
+    fn read(&mut self, cloud: &Cloud, row: usize, blocks: &[usize]) -> Result<(), Error> {
+        let Neighbours { inverse_depths, blocks: length, inverse } = self;
+        *length = blocks.len().next_multiple_of(LANES);
+        refill(inverse_depths, repeat_n(f32::NAN, AROUND * AROUND * *length))?;
+        refill(inverse, repeat_n(f32::NAN, cloud.width + AROUND))?;
         for line in 0..AROUND {
             let y = (row * BLOCK + line).wrapping_sub(1);
             if y >= cloud.height {
@@ -469,13 +492,13 @@ impl Neighbours {
                 *to = inverse_depth(*depth);
             }
             for column in 0..AROUND {
-                let to = &mut inverse_depths[(line * AROUND + column) * length..];
+                let to = &mut inverse_depths[(line * AROUND + column) * *length..];
                 for (to, block) in to.iter_mut().zip(blocks) {
                     *to = inverse[block * BLOCK + column];
                 }
             }
         }
-        Neighbours { inverse_depths, blocks: length }
+        Ok(())
     }
 
     /// Of the points next to those in a column and row of the blocks from the `first` on; around pixels not in the mask

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use crate::Error;
 use crate::cloud::Points;
 use crate::fast::buffer::Buffer;
 use crate::fast::lanes::transpose4;
@@ -42,6 +43,12 @@ pub(crate) fn rows_of_rings(reach: usize, height: usize) -> usize {
     (2 * reach + 3).min(height + 2)
 }
 
+/// Elements from a row of rings of so many columns to the next.
+#[inline(always)]
+fn stride(columns: usize) -> usize {
+    columns.next_multiple_of(GROUP) + 2
+}
+
 impl<const N: usize> Rings<N> {
     /// Bytes that a column takes in a row.
     pub const COLUMN: usize = size_of::<[f64; N]>() + size_of::<Counted>();
@@ -51,13 +58,18 @@ impl<const N: usize> Rings<N> {
         self.sums.size() + self.points.size()
     }
 
-    /// Starts over at row `top`, with rings of so many rows.
+    /// Makes room for so many columns and rows.
+    pub fn reserve(&mut self, columns: usize, rows: usize) -> Result<(), Error> {
+        let length = rows * stride(columns);
+        self.points.grow(length + BLOCK * GROUP)?;
+        self.sums.grow(length)
+    }
+
+    /// Starts over at row `top`, with rings of so many rows; there is room.
     pub fn start(&mut self, columns: Range<usize>, top: usize, rows: usize) {
         (self.columns, self.largest, self.rows) = (columns, 0.0, rows);
         let length = self.rows * self.stride();
-        self.points.grow(length + BLOCK * GROUP);
         self.points[..length].fill([0.0; 4]);
-        self.sums.grow(length);
         let above = self.row(top + self.rows - 1);
         self.sums[above].fill([0.0; N]);
     }
@@ -65,7 +77,7 @@ impl<const N: usize> Rings<N> {
     /// Elements from a row to the next.
     #[inline(always)]
     pub fn stride(&self) -> usize {
-        self.columns.len().next_multiple_of(GROUP) + 2
+        stride(self.columns.len())
     }
 
     /// The first column.

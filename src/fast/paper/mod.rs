@@ -27,6 +27,7 @@ use super::{Chunk, Parts, lock, read_map, share_out};
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
+use crate::memory::resize;
 use crate::options::{DistanceMetric, Method, Options};
 use crate::paper::{Asked, BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, PaperMaps};
 use crate::simd::{GROUP, Groups};
@@ -97,9 +98,8 @@ pub(crate) fn compute_with_radii(
 ) -> Result<(), Error> {
     compute(isa, points, options, None, normals, scratch)?;
     let length = row_length(points.width());
-    let map = &scratch.paper.radii;
-    read_map(&scratch.chunks, radii, |place| &map[place * length..][..points.width()]);
-    Ok(())
+    let (map, size) = (&scratch.paper.radii, (points.width(), points.height()));
+    read_map(&scratch.chunks, size, radii, |place| &map[place * length..][..length])
 }
 
 /// The normals of the blocks whose middle pixel has a window of one of these radii; NaN for the others.
@@ -130,7 +130,7 @@ pub(crate) fn even_windows(
     scratch.prepare(threads)?;
     let super::Scratch { workers, each, .. } = scratch;
     let blocks = &asked.blocks;
-    windows.resize(blocks.count(), EvenWindow::default());
+    resize(windows, blocks.count(), EvenWindow::default())?;
     let parts = Parts(windows.as_mut_ptr());
     let radius = |block: usize| {
         let (x, y) = blocks.middle(block);
@@ -139,6 +139,9 @@ pub(crate) fn even_windows(
     let needed_blocks = (0..blocks.count()).filter(|block| needed[*block]);
     let largest = needed_blocks.map(radius).max().unwrap_or(0) as usize;
     let grid = Grid::new(cloud.width, cloud.height, largest, Rings::<MOMENTS>::COLUMN);
+    for scratch in &each[..workers.count()] {
+        grid.reserve(&mut lock(scratch).paper.moments)?;
+    }
     workers.for_each(grid.count(), |worker, item| {
         let Some((columns, rows)) = grid.tile(item) else { return };
         let tile = EvenTile { cloud, asked, needed, columns, rows, largest };
@@ -159,17 +162,16 @@ pub(crate) fn choices(
 ) -> Result<(), Error> {
     scratch.prepare(threads)?;
     let rows = choices.chunks_mut(BLOCK * even.cloud.width).enumerate();
-    scratch.workers.for_each_part(rows, |(row, choices)| {
-        // SAFETY: the processor has the instruction set.
-        unsafe { paths::run(isa, ChoicesTask { even, row, choices }) };
-    });
-    Ok(())
+    // SAFETY: the processor has the instruction set.
+    scratch.workers.share(rows, |rows| unsafe { paths::run(isa, ChoicesTask { even, rows }) })
 }
 
 /// The image in tiles of like sizes.
 struct Grid {
     width: usize,
     height: usize,
+    /// How far windows reach from their pixels.
+    reach: usize,
     /// Of a tile.
     columns: usize,
     rows: usize,
@@ -178,20 +180,26 @@ struct Grid {
 }
 
 impl Grid {
-    /// Tiles for windows that reach `largest` from their pixels at most, in rings of so many bytes a column and row.
-    fn new(width: usize, height: usize, largest: usize, column: usize) -> Self {
-        let ring = rows_of_rings(largest, height);
-        let columns = (RING_BYTES / (column * ring)).max(4 * largest);
-        let columns = columns.min(MOST_INDICES / ring - 2 * largest - 4 * GROUP);
+    /// Tiles for windows that reach so far from their pixels, in rings of so many bytes a column and row.
+    fn new(width: usize, height: usize, reach: usize, column: usize) -> Self {
+        let ring = rows_of_rings(reach, height);
+        let columns = (RING_BYTES / (column * ring)).max(4 * reach);
+        let columns = columns.min(MOST_INDICES / ring - 2 * reach - 4 * GROUP);
         let across = width.div_ceil(columns.next_multiple_of(GROUP));
         let columns = width.div_ceil(across).next_multiple_of(BLOCK * GROUP);
         let down = height.div_ceil(TILE_ROWS);
         let rows = height.div_ceil(down).next_multiple_of(BLOCK);
-        Grid { width, height, columns, rows, across, down }
+        Grid { width, height, reach, columns, rows, across, down }
     }
 
     fn count(&self) -> usize {
         self.across * self.down
+    }
+
+    /// Makes room for the tiles.
+    fn reserve<const N: usize>(&self, rings: &mut Rings<N>) -> Result<(), Error> {
+        let columns = (self.columns + 2 * self.reach).min(self.width);
+        rings.reserve(columns, rows_of_rings(self.reach, self.height))
     }
 
     /// The columns and rows of a tile, which start with a block; none where the tiles before have covered all.
@@ -224,14 +232,16 @@ impl<'a> Job<'a> {
         scratch.prepare(options.threads)?;
         let super::Scratch { workers, paper, .. } = scratch;
         let length = row_length(points.width());
-        paper.depths.try_grow(length * points.height())?;
+        paper.depths.grow(length * points.height())?;
         let rows = paper.depths[..length * points.height()].chunks_mut(length).enumerate();
-        workers.for_each_part(rows, |(y, depths)| {
-            let task = DepthsTask { points, options, y, whole_points, depths };
-            // SAFETY: the processor has the instruction set.
-            unsafe { paths::run(self.isa, task) };
-        });
-        Ok(())
+        workers.share(rows, |share| {
+            for (y, depths) in share {
+                let task = DepthsTask { points, options, y, whole_points, depths };
+                // SAFETY: the processor has the instruction set.
+                unsafe { paths::run(self.isa, task) };
+            }
+            Ok(())
+        })
     }
 
     /// The radii of all windows, in the chunks' rows; gives the largest.
@@ -244,11 +254,14 @@ impl<'a> Job<'a> {
         let reach = if count > 1 { reach(&options.paper) } else { height };
         share_out(height, count, reach, chunks);
         let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
-        paper.radii.try_grow(swept * length)?;
+        paper.radii.grow(swept * length)?;
         let depths = &paper.depths[..length * height];
         let radii = &mut paper.radii[..swept * length];
         let largest = AtomicU32::new(0);
         if options.paper.distance_metric == DistanceMetric::Euclidean {
+            for scratch in &each[..count] {
+                lock(scratch).paper.sweep.reserve(width, &options.paper)?;
+            }
             let parts = Parts(radii.as_mut_ptr());
             workers.for_each(chunks.len(), |worker, item| {
                 let Chunk { swept, start, own } = &chunks[item];
@@ -262,7 +275,7 @@ impl<'a> Job<'a> {
                 largest.fetch_max(radius as u32, Ordering::Relaxed);
             });
         } else {
-            let maps = PaperMaps::new(points, options);
+            let maps = PaperMaps::new(points, options)?;
             for Chunk { swept, start, .. } in chunks.iter() {
                 for (y, row) in swept.clone().zip(radii[start * length..].chunks_mut(length)) {
                     let exact = &maps.smoothing_radii[y * width..][..width];
@@ -282,7 +295,7 @@ impl<'a> Job<'a> {
         let Blocks { across, down, .. } = Blocks::of(self.points.width(), self.points.height());
         let length = row_length(across);
         share_out(down, 1, down, chunks);
-        paper.radii.try_grow(down * length)?;
+        paper.radii.grow(down * length)?;
         for (to, from) in paper.radii.chunks_mut(length).zip(given.chunks(across)) {
             for (to, from) in to.iter_mut().zip(from) {
                 *to = *from as f32;
@@ -314,6 +327,14 @@ impl<'a> Job<'a> {
             (&depths[y * length..][..length], &radii[at..at + radii_length])
         };
         let grid = Grid::new(width, height, largest, column(options.method));
+        for scratch in &each[..workers.count()] {
+            let WorkerScratch { moments, gradients, depth_changes, .. } = &mut lock(scratch).paper;
+            match options.method {
+                Method::CovarianceMatrix => grid.reserve(moments)?,
+                Method::AverageDepthChange => grid.reserve(depth_changes)?,
+                Method::Average3DGradient | Method::Simple3DGradient => grid.reserve(gradients)?,
+            }
+        }
         workers.for_each(grid.count(), |worker, item| {
             let Some((columns, rows)) = grid.tile(item) else { return };
             let tile = Tile { points, options, columns, rows, whole_points, largest, step, row };
@@ -421,19 +442,18 @@ impl Task for EvenTask<'_, '_> {
     }
 }
 
-/// The choices of the pixels of one row of blocks.
-struct ChoicesTask<'a> {
+/// The choices of the pixels of some rows of blocks.
+struct ChoicesTask<'a, 'c> {
     even: &'a EvenWindows<'a>,
-    row: usize,
-    choices: &'a mut [Option<u32>],
+    rows: &'a mut dyn Iterator<Item = (usize, &'c mut [Option<u32>])>,
 }
 
-impl Task for ChoicesTask<'_> {
-    type Output = ();
+impl Task for ChoicesTask<'_, '_> {
+    type Output = Result<(), Error>;
 
     #[inline(always)]
-    unsafe fn run<S: Groups>(self) {
+    unsafe fn run<S: Groups>(self) -> Result<(), Error> {
         // SAFETY: as the caller's.
-        unsafe { choices::row::<S>(self.even, self.row, self.choices) };
+        unsafe { choices::rows::<S>(self.even, self.rows) }
     }
 }

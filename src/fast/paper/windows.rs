@@ -8,8 +8,9 @@
 use std::ops::Range;
 
 use super::depths::row_length;
+use crate::Error;
 use crate::fast::buffer::Buffer;
-use crate::fast::lanes::LANES;
+use crate::fast::lanes::{LANES, Lanes};
 use crate::options::PaperOptions;
 use crate::simd::Simd;
 
@@ -22,6 +23,11 @@ const AT_ONCE: usize = 4;
 /// How far, in pixels, a depth change can be that decides a window.
 pub(crate) fn reach(options: &PaperOptions) -> usize {
     (f64::from(options.largest_radius + 1) * std::f64::consts::SQRT_2) as usize + 2
+}
+
+/// Columns before and after a row's own, at least as many as are looked at.
+fn margin(options: &PaperOptions) -> usize {
+    (reach(options) + AT_ONCE).next_multiple_of(LANES)
 }
 
 /// What a sweep needs beside its map.
@@ -37,7 +43,7 @@ pub(crate) struct Sweep {
     /// Squares of them, with room before and after.
     squares: Buffer<f32>,
     /// The square of every distance along a row, from 1 on, in all lanes.
-    along: Vec<[f32; LANES]>,
+    along: Buffer<Lanes>,
 }
 
 /// The rows that are swept: the depths of the whole image, and the map's rows from the first one on.
@@ -75,25 +81,31 @@ impl Sweep {
     pub fn size(&self) -> usize {
         let Sweep { last, gap, right, below, squares, along } = self;
         let rows = [last, gap, right, below, squares];
-        let rows = rows.map(Buffer::size).into_iter().sum::<usize>();
-        rows + along.capacity() * size_of::<[f32; LANES]>()
+        rows.map(Buffer::size).into_iter().sum::<usize>() + along.size()
+    }
+
+    /// Makes room for rows of so many pixels.
+    pub fn reserve(&mut self, width: usize, options: &PaperOptions) -> Result<(), Error> {
+        let (length, margin) = (row_length(width), margin(options));
+        self.along.grow(margin)?;
+        for buffer in [&mut self.last, &mut self.gap, &mut self.right, &mut self.below] {
+            buffer.grow(length)?;
+        }
+        self.squares.grow(length + 2 * margin)
     }
 
     /// Fills the map with the windows' radii, whole numbers of pixels, 0 for none. Returns the largest of the own rows.
+    /// There is room for the rows.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     pub unsafe fn radii<S: Simd>(&mut self, rows: &mut Rows, options: &PaperOptions) -> f32 {
         const { assert!(S::LANES == LANES) };
-        let length = row_length(rows.width);
-        let margin = (reach(options) + AT_ONCE).next_multiple_of(LANES);
-        self.along.clear();
-        self.along.extend((1..=margin).map(|distance| [(distance * distance) as f32; LANES]));
-        for buffer in [&mut self.last, &mut self.gap, &mut self.right, &mut self.below] {
-            buffer.grow(length);
+        let margin = margin(options);
+        for (to, distance) in self.along[..margin].iter_mut().zip(1..) {
+            *to = Lanes([(distance * distance) as f32; LANES]);
         }
-        self.squares.grow(length + 2 * margin);
         // SAFETY: as the caller's.
         unsafe {
             self.down::<S>(rows, options);
@@ -192,7 +204,7 @@ impl Sweep {
         let length = row_length(rows.width);
         let inside = length - LANES;
         let (before, after) = (&mut self.below[..length], &mut self.squares[..length + 2 * margin]);
-        let (below, squares) = (before, after);
+        let (below, squares, along) = (before, after, &self.along[..margin]);
         below.fill(FAR);
         squares.fill(FAR * FAR);
         // SAFETY: as the caller's; the margins are as wide as the search is.
@@ -215,7 +227,7 @@ impl Sweep {
                 for x in (0..inside).step_by(LANES) {
                     let depth = S::load(depths.add(x));
                     let squares = squares.as_ptr().add(margin + x);
-                    let radius = radius::<S>(depth, squares, &self.along, options);
+                    let radius = radius::<S>(depth, squares, along, options);
                     largest_of_row = S::max(radius, largest_of_row);
                     S::store(map.add(x), radius);
                 }
@@ -281,7 +293,7 @@ unsafe fn is_change<S: Simd>(
 unsafe fn radius<S: Simd>(
     depth: S::F,
     squares: *const f32,
-    along: &[[f32; LANES]],
+    along: &[Lanes],
     options: &PaperOptions,
 ) -> S::F {
     // SAFETY: as the caller's.
@@ -298,13 +310,13 @@ unsafe fn radius<S: Simd>(
         let mut nearest = S::load(squares);
         let mut column = 0;
         for along in along.chunks_exact(AT_ONCE) {
-            if S::bits(S::lt(S::load(along[0].as_ptr()), S::min(nearest, enough))) == 0 {
+            if S::bits(S::lt(along[0].load::<S>(), S::min(nearest, enough))) == 0 {
                 break;
             }
             for along in along {
                 column += 1;
                 let (left, right) = (S::load(squares.sub(column)), S::load(squares.add(column)));
-                nearest = S::min(nearest, S::add(S::min(left, right), S::load(along.as_ptr())));
+                nearest = S::min(nearest, S::add(S::min(left, right), along.load::<S>()));
             }
         }
         let distance = S::sqrt(nearest);
