@@ -285,7 +285,8 @@ impl Estimator {
     fn estimates(&mut self, points: &Points) -> Result<&[[f32; 4]], Error> {
         let is_plain = self.is_plain(points);
         let Estimator { options, isa, scratch, cloud, second_pass } = self;
-        cloud.read(points, options)?;
+        scratch.prepare(options.threads)?;
+        cloud.read(points, options, scratch.workers())?;
         // To PCL's windows, a point that misses a coordinate is missing whole.
         let is_pcl = options.semantics == Semantics::Pcl;
         let cleaned = is_pcl.then(|| packed(&cloud.points, cloud.width, cloud.height));

@@ -7,6 +7,7 @@ use super::run::OfRun;
 use super::tile::{Found, Sums};
 use crate::Error;
 use crate::memory::{bytes, make_room};
+use crate::paper::ROUNDING;
 use crate::simd::{GROUP, Groups, Simd};
 use crate::window::Image;
 
@@ -16,6 +17,8 @@ pub(crate) struct HalfWindows {
     integrals: Buffer<f64>,
     /// The place of the row pushed last; before the first the one after the ring, which is zero.
     pushed: usize,
+    /// What the rounding errors of a difference between two sums stay below.
+    error: f64,
     /// By the side of a window.
     places: Vec<Places>,
 }
@@ -25,6 +28,8 @@ type Tangents<T> = [[T; 3]; 2];
 
 /// A normal is doubtful where floats could turn it by more than 1e-4: (sine of the angle between the tangents) < 1e-3.
 const DOUBT_SINE: f32 = 1e-6;
+/// Or where the sums' rounding could.
+const DOUBT_ROUNDING: f64 = 1e8;
 
 /// What a window is made from, from the column of its pixel on.
 #[derive(Debug)]
@@ -76,8 +81,10 @@ impl Sums for HalfWindows {
         make_room(&mut self.places, side + 1)
     }
 
-    fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, _origin: [f32; 3]) {
+    fn start(&mut self, frame: &Frame, limit: f32, _side: usize, _origin: [f32; 3]) {
         self.pushed = frame.start_ring(1, &mut self.integrals);
+        let pixels = frame.columns.len() * frame.rows.len();
+        self.error = 2.0 * ROUNDING * f64::from(limit) * pixels as f64;
     }
 
     fn size(&self) -> usize {
@@ -245,6 +252,11 @@ impl Sums for HalfWindows {
             let n2 = dot(n, n);
             let (h2, v2) = (dot(h, h), dot(v, v));
             let sine = h2 * v2 * Floats::splat(DOUBT_SINE);
+            let doubt = Floats::splat((DOUBT_ROUNDING * self.error * self.error) as f32);
+            let half = Floats::<S>(S::truncate(S::mul(sides, S::splat(0.5))));
+            let points = half * half;
+            let exact = (doubt * (h2 + v2)).lt(n2 * points * points);
+            let exact_ends = doubt.lt(h2) & doubt.lt(v2);
             // Below this, squares of floats lose digits.
             let least = Floats::splat(f32::MIN_POSITIVE / f32::EPSILON);
             // In windows of 3 both tangents join the same two points: floats decide the direction, as in PCL.
@@ -252,12 +264,13 @@ impl Sums for HalfWindows {
             // And where they say that the tangents are parallel, there is no normal: n / |n| is NaN then.
             let zero = Floats::splat(0.0);
             let parallel = !(zero.lt(n[0].abs().max(n[1].abs()).max(n[2].abs())));
-            let floats_decide = smallest & (least.lt(n2) | parallel & least.lt(h2) & least.lt(v2));
+            let floats_decide = least.lt(n2) | parallel & least.lt(h2) & least.lt(v2);
+            let floats_decide = smallest & exact_ends & floats_decide;
             let scale = Floats::splat(1.0) / n2.sqrt();
             Found {
                 normal: [n[0] * scale, n[1] * scale, n[2] * scale],
                 curvature: Floats::splat(f32::NAN),
-                doubtful: !(sine.max(least).lt(n2) | floats_decide),
+                doubtful: !(exact & sine.max(least).lt(n2) | floats_decide),
             }
         }
     }

@@ -85,7 +85,7 @@ struct WorkerScratch {
 
 impl Scratch {
     /// So many workers, as far as there can be, and scratch memory for each.
-    fn prepare(&mut self, threads: usize) -> Result<(), Error> {
+    pub fn prepare(&mut self, threads: usize) -> Result<(), Error> {
         self.workers.prepare(threads)?;
         self.each.resize_with(self.workers.count().max(self.each.len()), Mutex::default);
         Ok(())

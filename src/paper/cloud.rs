@@ -3,9 +3,10 @@
 use super::rect::Rect;
 use crate::Error;
 use crate::cloud::Points;
-use crate::memory::{bytes, make_room, refill};
+use crate::memory::{bytes, resize};
 use crate::methods::is_finite;
 use crate::options::{Depth, Options, Semantics};
+use crate::threads::Workers;
 
 /// An organized cloud, row by row. A missing point has NaN coordinates and NaN depth.
 #[derive(Debug, Default)]
@@ -19,23 +20,26 @@ pub(crate) struct Cloud {
 impl Cloud {
     pub fn new(points: &Points, options: &Options) -> Result<Self, Error> {
         let mut cloud = Cloud::default();
-        cloud.read(points, options)?;
+        cloud.read(points, options, &Workers::default())?;
         Ok(cloud)
     }
 
     /// Becomes another cloud.
-    pub fn read(&mut self, points: &Points, options: &Options) -> Result<(), Error> {
+    pub fn read(
+        &mut self,
+        points: &Points,
+        options: &Options,
+        workers: &Workers,
+    ) -> Result<(), Error> {
         let (width, height) = (points.width(), points.height());
         (self.width, self.height) = (width, height);
         let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
-        // Row by row: of an iterator over both, the vector would not know how long it is.
-        make_room(&mut self.points, width * height)?;
-        for y in 0..height {
-            self.points.extend((0..width).map(|x| cleaned.at(x, y)));
-        }
+        resize(&mut self.points, width * height, [f32::NAN; 3])?;
+        workers.fill(&mut self.points, width, |x, y| cleaned.at(x, y))?;
         let range = options.semantics == Semantics::Paper && options.paper.depth == Depth::Range;
-        let depth = |&[x, y, z]: &[f32; 3]| if range { (x * x + y * y + z * z).sqrt() } else { z };
-        refill(&mut self.depths, self.points.iter().map(depth))
+        let depth = |[x, y, z]: [f32; 3]| if range { (x * x + y * y + z * z).sqrt() } else { z };
+        resize(&mut self.depths, width * height, f32::NAN)?;
+        workers.fill(&mut self.depths, width, |x, y| depth(self.points[y * width + x]))
     }
 
     /// Bytes held.

@@ -17,6 +17,7 @@ use super::planes::{JITTER, Plane, inverse_depth};
 use super::rect::Rect;
 use crate::Error;
 use crate::memory::table;
+use crate::threads::Workers;
 
 /// Where there are depth changes, row by row.
 pub(crate) struct DepthChanges {
@@ -65,7 +66,7 @@ impl DepthChanges {
 
     /// Without the changes that the slope of the surface on both sides explains: on a steep surface neighbours are
     /// as far apart as across an edge.
-    pub fn not_explained(&self, cloud: &Cloud) -> Result<DepthChanges, Error> {
+    pub fn not_explained(&self, cloud: &Cloud, workers: &Workers) -> Result<DepthChanges, Error> {
         /// How far the surface is looked at along and across a change, in pixels.
         const ALONG: usize = 5;
         const ACROSS: usize = 2;
@@ -98,8 +99,12 @@ impl DepthChanges {
             sides.next() == Some(true) && sides.all(|is_steep| is_steep)
         };
         let left = |axis: usize, changes: &[bool]| {
-            let is_left = |(at, change): (usize, &bool)| *change && !is_explained(axis, at);
-            table(changes.iter().enumerate().map(is_left))
+            let mut left = table(repeat_n(false, changes.len()))?;
+            workers.fill(&mut left, width, |x, y| {
+                let at = y * width + x;
+                changes[at] && !is_explained(axis, at)
+            })?;
+            Ok::<_, Error>(left)
         };
         let (right, below) = (left(0, &self.right)?, left(1, &self.below)?);
         Ok(DepthChanges { width, height, right, below })

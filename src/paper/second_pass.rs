@@ -102,7 +102,8 @@ impl SecondPass {
         let blocks = Blocks::of(cloud.width, cloud.height);
         self.concern(cloud, &blocks, options, engine.workers())?;
         let SecondPass { wanted, levels, windows, choices, taken, second, .. } = self;
-        let clean = depth_changes(cloud, options)?.not_explained(cloud)?.clean_radii()?;
+        let clean = depth_changes(cloud, options)?;
+        let clean = clean.not_explained(cloud, engine.workers())?.clean_radii()?;
         let least_noise = Asked::least_noise(options.paper.alpha);
         let limit = options.paper.largest_radius;
         let asked = Asked { blocks, wanted, levels, clean: &clean, limit, least_noise };
