@@ -440,7 +440,8 @@ impl Matrices {
             let least = Floats::splat((DOUBT_SUMS * error) as f32);
             // Where the points lie on a line, the steps may end at the largest eigenvalue instead.
             let is_smallest = value.lt(Floats::splat(1.0 / 3.0));
-            let sums = least.lt(slope * trace);
+            // Rounding alone may give any slope, but no trace.
+            let sums = least.lt(slope * trace) & least.lt(trace);
             let sure = Floats::splat(DOUBT_PLANE).lt(slope) & sums & is_smallest;
             // Of the pair's groups, these pixels'.
             let unsettled = self.unsettled[at / LANES] >> (at % LANES);

@@ -340,11 +340,15 @@ impl Tile<'_> {
         unsafe {
             of_run.solve::<S>(0, &lanes[..*length]);
             for number in 0..*length {
-                let (x, windows) = places[number];
+                let (x, mut windows) = places[number];
                 let at = number * LANES;
                 let sides = S::Pair::load(row.as_ptr().add(x));
                 let mut found = sums.estimate::<S::Pair>(of_run, at, sides, false);
-                let doubtful = found.doubtful & lanes[number];
+                let (mut doubtful, mut of_one_point) = (found.doubtful & lanes[number], 0);
+                if doubtful != 0 {
+                    of_one_point = self.of_one_point(frame, planes, row, (x, y), doubtful);
+                    (windows, doubtful) = (windows & !of_one_point, doubtful & !of_one_point);
+                }
                 let mut plain = windows & !lanes[number] | doubtful;
                 if doubtful != 0 {
                     let window = |lane: usize| ((x + lane, y), row[x + lane] as usize);
@@ -364,6 +368,10 @@ impl Tile<'_> {
                 ];
                 let viewpoint = self.options.viewpoint;
                 let mut estimates = Estimates::of(found, point, viewpoint, windows & !plain);
+                let curvature = if M::CURVATURE { 0.0 } else { f32::NAN };
+                for lane in Bits(of_one_point) {
+                    estimates.put(lane, Estimate { curvature, ..Estimate::NONE });
+                }
                 if plain != 0 {
                     self.plain_lanes(&mut estimates, row, (x, y), plain);
                 }
@@ -371,6 +379,40 @@ impl Tile<'_> {
                 sink.write(x, y, count, &estimates, M::CURVATURE);
             }
         }
+    }
+
+    /// The lanes, of some of those that begin with pixel `(x, y)`, whose windows, and the pixels around them, hold the
+    /// same point again and again, as a sensor's zeros for "no return" are. They have no normal, and curvature 0.
+    #[cold]
+    fn of_one_point(
+        &self,
+        frame: &Frame,
+        planes: &Planes,
+        row: &[f32],
+        (x, y): (usize, usize),
+        lanes: u32,
+    ) -> u32 {
+        let Image { width, height, .. } = *self.image;
+        let are_alike = |lanes: RangeInclusive<usize>, side: usize| {
+            let (before, after) = (side / 2 + 1, side.div_ceil(2) + 1);
+            let (first, last) = (x + lanes.start(), x + lanes.end());
+            let columns = first.saturating_sub(before)..(last + after).min(width);
+            let columns = frame.column(columns.start)..frame.column(columns.end);
+            let own = planes.rows(frame, y).map(|plane| plane[frame.column(first)].to_bits());
+            (y.saturating_sub(before)..(y + after).min(height)).all(|y| {
+                let planes = planes.rows(frame, y).map(|plane| &plane[columns.clone()]);
+                let differ = |c: usize| planes[c].iter().map(move |at| at.to_bits() ^ own[c]);
+                (0..3).flat_map(differ).fold(0, |any, bits| any | bits) == 0
+            })
+        };
+        let side = |lane: usize| row[x + lane] as usize;
+        let (first, last) = (lanes.trailing_zeros(), u32::BITS - 1 - lanes.leading_zeros());
+        let largest = Bits(lanes).map(side).max().unwrap_or(0);
+        if are_alike(first as usize..=last as usize, largest) {
+            return lanes;
+        }
+        let alone = Bits(lanes).filter(|lane| are_alike(*lane..=*lane, side(*lane)));
+        alone.fold(0, |alike, lane| alike | 1 << lane)
     }
 
     /// The normals of some lanes of those that begin with pixel `(x, y)`, by the plain form.
