@@ -210,9 +210,10 @@ pub(crate) fn compute(
     let per_chunk = chunks[0].own.len();
     let sides = |y: usize| sides(rows, width, chunks[y / per_chunk].place(y));
     let sink = Sink::new(normals, indices, width, listed)?;
-    let frame = Frame::largest(job.columns(reach), side as usize, width);
+    let side = (side as usize).min(width.min(height));
+    let frame = Frame::largest(job.columns(reach), side, width);
     for scratch in &each[..count] {
-        lock(scratch).reserve(options.method, &frame, side as usize)?;
+        lock(scratch).reserve(options.method, &frame, side)?;
     }
     if job.tiles(workers, each, reach, limit, &sides, &sink).is_err() {
         let limit = job.largest_coordinate();
@@ -276,8 +277,8 @@ impl Job<'_> {
     }
 
     // Not inlined, as the next one: profiles and the test of instruction counts tell the two by name.
-    /// Steps 1 to 3: fills the rows with sides of windows. Returns what neither the magnitude of any finite depth nor
-    /// a side is larger than.
+    /// Steps 1 to 3: fills the rows with sides of windows. Returns the largest magnitude of a finite depth, and a bound
+    /// on the sides.
     #[inline(never)]
     fn sweep(
         &self,
