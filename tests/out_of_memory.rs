@@ -91,7 +91,8 @@ fn memory_that_is_not_there_is_an_error() {
 fn normals(isa: Isa, cloud: &Cloud, options: &Options) {
     let expected = compute(&mut Estimator::with_isa(options.clone(), isa), cloud);
     let indices: Vec<i32> = (0..cloud.points.len() as i32).step_by(2).collect();
-    for threads in [1, 2] {
+    // Of the plain form next to nothing is shared out.
+    for threads in 1..=if isa == Isa::Scalar { 1 } else { 2 } {
         let mut options = options.clone();
         options.threads = threads;
         let what = format!("{isa:?} {options:?}");
