@@ -405,8 +405,7 @@ impl paper::Engine for Engine<'_> {
         if self.is_plain {
             return refill(windows, paper::even_windows(cloud, asked, needed));
         }
-        let threads = self.options.threads;
-        fast::paper::even_windows(self.isa, cloud, asked, needed, windows, threads, self.scratch)
+        fast::paper::even_windows(self.isa, cloud, asked, needed, windows, self.scratch)
     }
 
     fn choices(&mut self, even: &EvenWindows, choices: &mut Vec<Option<u32>>) -> Result<(), Error> {
@@ -414,7 +413,7 @@ impl paper::Engine for Engine<'_> {
             return refill(choices, even.choices());
         }
         refill(choices, repeat_n(None, even.cloud.depths.len()))?;
-        fast::paper::choices(self.isa, even, choices, self.options.threads, self.scratch)
+        fast::paper::choices(self.isa, even, choices, self.workers())
     }
 
     fn of_blocks(

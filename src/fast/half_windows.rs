@@ -17,8 +17,8 @@ pub(crate) struct HalfWindows {
     integrals: Buffer<f64>,
     /// The place of the row pushed last; before the first the one after the ring, which is zero.
     pushed: usize,
-    /// What the rounding errors of a difference between two sums stay below.
-    error: f64,
+    /// The square of what rounding errors of the sums stay below, times [`DOUBT_ROUNDING`].
+    doubt: f32,
     /// By the side of a window.
     places: Vec<Places>,
 }
@@ -84,7 +84,9 @@ impl Sums for HalfWindows {
     fn start(&mut self, frame: &Frame, limit: f32, _side: usize, _origin: [f32; 3]) {
         self.pushed = frame.start_ring(1, &mut self.integrals);
         let pixels = frame.columns.len() * frame.rows.len();
-        self.error = 2.0 * ROUNDING * f64::from(limit) * pixels as f64;
+        // What the rounding errors of a difference between two sums stay below.
+        let error = 2.0 * ROUNDING * f64::from(limit) * pixels as f64;
+        self.doubt = (DOUBT_ROUNDING * error * error) as f32;
     }
 
     fn size(&self) -> usize {
@@ -252,7 +254,7 @@ impl Sums for HalfWindows {
             let n2 = dot(n, n);
             let (h2, v2) = (dot(h, h), dot(v, v));
             let sine = h2 * v2 * Floats::splat(DOUBT_SINE);
-            let doubt = Floats::splat((DOUBT_ROUNDING * self.error * self.error) as f32);
+            let doubt = Floats::splat(self.doubt);
             let half = Floats::<S>(S::truncate(S::mul(sides, S::splat(0.5))));
             let points = half * half;
             let exact = (doubt * (h2 + v2)).lt(n2 * points * points);

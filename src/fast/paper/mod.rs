@@ -31,6 +31,7 @@ use crate::memory::resize;
 use crate::options::{DistanceMetric, Method, Options};
 use crate::paper::{Asked, BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, PaperMaps};
 use crate::simd::{GROUP, Groups};
+use crate::threads::Workers;
 
 /// Elements of a tile's rings at most: floats hold their indices. Room for the largest windows there are.
 const MOST_INDICES: usize = 1 << 24;
@@ -117,17 +118,15 @@ pub(crate) fn compute_of_blocks(
     job.tiles(scratch, None, normals, largest, BLOCK)
 }
 
-/// The even windows of the needed blocks.
+/// The even windows of the needed blocks, by the workers there are.
 pub(crate) fn even_windows(
     isa: Isa,
     cloud: &Cloud,
     asked: &Asked,
     needed: &[bool],
     windows: &mut Vec<EvenWindow>,
-    threads: usize,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
-    scratch.prepare(threads)?;
     let super::Scratch { workers, each, .. } = scratch;
     let blocks = &asked.blocks;
     resize(windows, blocks.count(), EvenWindow::default())?;
@@ -157,13 +156,11 @@ pub(crate) fn choices(
     isa: Isa,
     even: &EvenWindows,
     choices: &mut [Option<u32>],
-    threads: usize,
-    scratch: &mut super::Scratch,
+    workers: &Workers,
 ) -> Result<(), Error> {
-    scratch.prepare(threads)?;
     let rows = choices.chunks_mut(BLOCK * even.cloud.width).enumerate();
     // SAFETY: the processor has the instruction set.
-    scratch.workers.share(rows, |rows| unsafe { paths::run(isa, ChoicesTask { even, rows }) })
+    workers.share(rows, |rows| unsafe { paths::run(isa, ChoicesTask { even, rows }) })
 }
 
 /// The image in tiles of like sizes.
