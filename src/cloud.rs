@@ -84,14 +84,15 @@ impl Grid {
             return a.abs_diff(b).is_multiple_of(step);
         }
         // Addresses are multiples of 4, so fields share a byte only where they are equal:
-        // b - a = i * point_stride + j * row_stride.
+        // b - a = i * point_stride + j * row_stride, where the former is less than a row.
         let (ps, rs) = (self.point_stride as i128, self.row_stride as i128);
         let difference = b as i128 - a as i128;
         let rows = self.height.max(other.height) as i128;
         let columns = self.width.max(other.width) as i128;
-        (1 - rows..rows).any(|j| {
+        let j = difference.div_euclid(rs);
+        [j, j + 1].into_iter().any(|j| {
             let rest = difference - j * rs;
-            rest % ps == 0 && (rest / ps).abs() < columns
+            j.abs() < rows && rest % ps == 0 && (rest / ps).abs() < columns
         })
     }
 }
