@@ -198,6 +198,26 @@ fn wide_clouds_equal_the_plain_form() {
     println!("{worst:?}");
 }
 
+/// A wide-angle camera's, or turned to a robot's axes: from some row on coordinates are larger than any depth, so what
+/// sums of integers allow is found out late in a tile.
+#[test]
+fn points_far_off_the_axis_equal_the_plain_form() {
+    let mut worst = Worst::default();
+    for (seed, kind) in (0..).zip([Kind::Wavy, Kind::NanBlocks, Kind::Steps]) {
+        for (first, off) in [(0, 1e2), (40, 1e2), (40, 1e5), (75, 1e5)] {
+            let mut cloud = Cloud::new(kind, 81, 150, seed);
+            for [x, y, _] in &mut cloud.points[first * 81..] {
+                (*x, *y) = (off * *x, *y - off);
+            }
+            for method in methods() {
+                let options = options(method, 10.0, true);
+                worst.check(&cloud, &format!("{kind:?}, off by {off} from {first}"), &options);
+            }
+        }
+    }
+    println!("{worst:?}");
+}
+
 const CANARY: f32 = -12345.5;
 
 /// The cloud in an array of points of `stride` floats, rows `row` floats apart.

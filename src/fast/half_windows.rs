@@ -74,6 +74,7 @@ impl Sums for HalfWindows {
 
     const COLUMN: usize = size_of::<f64>();
     const CURVATURE: bool = false;
+    const LIMITED: bool = false;
     const PAIRS: bool = true;
 
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {

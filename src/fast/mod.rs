@@ -19,7 +19,7 @@ mod tile;
 mod windows;
 
 use std::ops::{Range, RangeInclusive};
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use buffer::Buffer;
@@ -30,7 +30,7 @@ use paths::Task;
 use planes::{Frame, Planes};
 use sink::Sink;
 use strips::Strips;
-use tile::{BeyondLimit, Sums, Tile};
+use tile::{Sums, Tile};
 use windows::{Sweep, WindowRows, row_length, sides};
 
 use crate::Error;
@@ -192,20 +192,20 @@ pub(crate) fn compute(
     }
     let length = row_length(width);
     let mut reach = job.reach(0.0).max(*last_reach);
-    let (limit, side, swept) = loop {
+    let (deepest, side, swept) = loop {
         share_out(height, count, reach, chunks);
         let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
         rows.grow(swept * length)?;
-        let [limit, side] = job.sweep(workers, each, chunks, &mut rows[..swept * length]);
-        if chunks.len() == 1 || job.reach(limit) <= reach {
-            break (limit, side, swept);
+        let [deepest, side] = job.sweep(workers, each, chunks, &mut rows[..swept * length]);
+        if chunks.len() == 1 || job.reach(deepest) <= reach {
+            break (deepest, side, swept);
         }
         // Depths reach farther than in the frame before.
-        reach = job.reach(DEEPER * limit);
+        reach = job.reach(DEEPER * deepest);
     };
-    *last_reach = reach.min(job.reach(DEEPER * limit));
+    *last_reach = reach.min(job.reach(DEEPER * deepest));
 
-    let reach = job.reach(limit);
+    let reach = job.reach(deepest);
     let rows = &rows[..swept * length];
     let per_chunk = chunks[0].own.len();
     let sides = |y: usize| sides(rows, width, chunks[y / per_chunk].place(y));
@@ -215,11 +215,7 @@ pub(crate) fn compute(
     for scratch in &each[..count] {
         lock(scratch).reserve(options.method, &frame, side)?;
     }
-    if job.tiles(workers, each, reach, limit, &sides, &sink).is_err() {
-        let limit = job.largest_coordinate();
-        // No coordinate is beyond this limit.
-        let _ = job.tiles(workers, each, reach, limit, &sides, &sink);
-    }
+    job.tiles(workers, each, reach, deepest, &sides, &sink);
     Ok(())
 }
 
@@ -314,38 +310,31 @@ impl Job<'_> {
         workers: &Workers,
         each: &[Mutex<WorkerScratch>],
         reach: usize,
-        limit: f32,
+        deepest: f32,
         sides: &(impl Fn(usize) -> &'r [f32] + Sync),
         sink: &Sink,
-    ) -> Result<(), BeyondLimit> {
+    ) {
         let Image { width, height, .. } = self.image;
         let columns = self.columns(reach);
         let across = width.div_ceil(columns);
         let down = height.div_ceil(TILE_ROWS);
         let rows = height.div_ceil(down);
-        let beyond = AtomicBool::new(false);
         workers.for_each(across * down, |worker, item| {
             let (row, column) = (item / across * rows, item % across * columns);
-            if beyond.load(Ordering::Relaxed) {
-                return;
-            }
             let tile = Tile {
                 points: self.points,
                 options: self.options,
                 image: &self.image,
                 columns: column..(column + columns).min(width),
                 rows: row..(row + rows).min(height),
-                limit,
+                deepest,
                 whole_points: self.whole_points,
             };
             let scratch = &mut lock(&each[worker]);
             let task = TileTask { tile: &tile, scratch, sides, sink };
             // SAFETY: the processor has the instruction set of the job, and tiles do not share pixels.
-            if unsafe { paths::run(self.isa, task) }.is_err() {
-                beyond.store(true, Ordering::Relaxed);
-            }
+            unsafe { paths::run(self.isa, task) };
         });
-        if beyond.into_inner() { Err(BeyondLimit) } else { Ok(()) }
     }
 
     /// Columns of a tile, if windows reach so far from their pixels.
@@ -362,13 +351,6 @@ impl Job<'_> {
         // Tiles of like widths.
         let across = self.image.width.div_ceil(columns);
         self.image.width.div_ceil(across).next_multiple_of(GROUP)
-    }
-
-    /// The largest magnitude of a finite coordinate.
-    fn largest_coordinate(&self) -> f32 {
-        let rows = (0..self.image.height)
-            .flat_map(|y| (0..self.image.width).flat_map(move |x| self.points.at(x, y)));
-        rows.map(f32::abs).filter(|c| c.is_finite()).fold(0.0, f32::max)
     }
 }
 
@@ -407,10 +389,10 @@ struct TileTask<'a, F> {
 }
 
 impl<'r, F: Fn(usize) -> &'r [f32]> Task for TileTask<'_, F> {
-    type Output = Result<(), BeyondLimit>;
+    type Output = ();
 
     #[inline(always)]
-    unsafe fn run<S: Groups>(self) -> Result<(), BeyondLimit> {
+    unsafe fn run<S: Groups>(self) {
         let TileTask { tile, scratch, sides, sink } = self;
         let WorkerScratch { frame, planes, moments, strips, simple_strips, half_windows, .. } =
             scratch;

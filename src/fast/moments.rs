@@ -93,6 +93,7 @@ impl Sums for Moments {
 
     const COLUMN: usize = CHANNELS * size_of::<f64>();
     const CURVATURE: bool = true;
+    const LIMITED: bool = false;
     const PAIRS: bool = false;
 
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {

@@ -145,8 +145,8 @@ pub(crate) struct Planes {
 pub(crate) struct RowNews {
     /// A point has a finite z but not a finite x or y: no depth change tells of it.
     pub hidden: bool,
-    /// A finite coordinate is larger than the limit.
-    pub beyond: bool,
+    /// The largest magnitude of x or y of a finite point.
+    pub largest: f32,
 }
 
 impl Planes {
@@ -188,7 +188,6 @@ impl Planes {
         points: &Points,
         frame: &Frame,
         y: usize,
-        limit: f32,
         whole_points: bool,
     ) -> RowNews {
         let start = frame.start(3, y);
@@ -213,10 +212,9 @@ impl Planes {
                 S::store(ys.add(at), y);
                 S::store(zs.add(at), z);
             }
-            RowNews {
-                hidden: S::bits(hidden) != 0,
-                beyond: S::bits(S::lt(S::splat(limit), largest)) != 0,
-            }
+            let mut lanes = [0.0; GROUP];
+            S::store(lanes.as_mut_ptr(), largest);
+            RowNews { hidden: S::bits(hidden) != 0, largest: lanes.into_iter().fold(0.0, f32::max) }
         }
     }
 }

@@ -61,6 +61,7 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
 
     const COLUMN: usize = 6 * size_of::<i32>();
     const CURVATURE: bool = false;
+    const LIMITED: bool = true;
     const PAIRS: bool = true;
 
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {

@@ -54,13 +54,17 @@ pub(crate) trait Sums {
     /// Whether the method gives a curvature.
     const CURVATURE: bool;
 
+    /// Whether sums go wrong where a coordinate is beyond the limit.
+    const LIMITED: bool;
+
     /// Whether pairs of groups are summed as such: not where a group's sums fill the registers.
     const PAIRS: bool;
 
     /// Makes room for frames that are no larger, and windows of up to `side`.
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error>;
 
-    /// Forgets the rows pushed before. `limit` bounds the coordinates, `side` the windows.
+    /// Forgets the rows pushed before. `limit` bounds the depths, and where the method is [`Sums::LIMITED`] all
+    /// coordinates; `side` the windows.
     fn start(&mut self, frame: &Frame, limit: f32, side: usize, origin: [f32; 3]);
 
     /// Bytes held.
@@ -167,13 +171,13 @@ pub(crate) struct Tile<'a> {
     /// The pixels to compute; the first column is a multiple of the group.
     pub columns: Range<usize>,
     pub rows: Range<usize>,
-    /// No coordinate's magnitude is larger.
-    pub limit: f32,
+    /// No finite depth is larger.
+    pub deepest: f32,
     pub whole_points: bool,
 }
 
-/// A coordinate was beyond the tile's limit; what was written must be computed again with a larger one.
-pub(crate) struct BeyondLimit;
+/// A coordinate that is larger than the limit, where the method has one.
+struct BeyondLimit;
 
 impl Tile<'_> {
     /// Computes the tile's normals. `sides` gives a row's sides of windows, readable up to a whole group. There is room
@@ -189,7 +193,7 @@ impl Tile<'_> {
         sums: &mut M,
         sides: &impl Fn(usize) -> &'r [f32],
         sink: &Sink,
-    ) -> Result<(), BeyondLimit> {
+    ) {
         // SAFETY: as the caller's.
         let side = unsafe { self.largest_side::<S>(sides) };
         if side == 0 {
@@ -199,23 +203,51 @@ impl Tile<'_> {
                     unsafe { sink.write_none(x, y, (self.columns.end - x).min(GROUP)) };
                 }
             }
-            return Ok(());
+            return;
         }
         let size = (self.image.width, self.image.height);
         *frame = Frame::around(&self.columns, &self.rows, side, size);
-        sums.start(frame, self.limit, side, self.origin(sides));
-        let mut run = Run::default();
+        let origin = self.origin(sides);
+        // Seldom is a point farther from the camera's axis than the deepest one from the camera.
+        let mut limit = self.deepest;
+        loop {
+            sums.start(frame, limit, side, origin);
+            // SAFETY: as the caller's.
+            let done = unsafe { self.rows::<S, M>(frame, planes, sums, sides, sink, side, limit) };
+            let Err(BeyondLimit) = done else { break };
+            for y in frame.rows.clone() {
+                // SAFETY: as the caller's.
+                let news = unsafe { planes.push::<S>(self.points, frame, y, self.whole_points) };
+                limit = limit.max(news.largest);
+            }
+        }
+    }
 
+    /// Computes all rows; what was written before a coordinate was beyond the limit must be written again.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    unsafe fn rows<'r, S: Groups, M: Sums>(
+        &self,
+        frame: &Frame,
+        planes: &mut Planes,
+        sums: &mut M,
+        sides: &impl Fn(usize) -> &'r [f32],
+        sink: &Sink,
+        side: usize,
+        limit: f32,
+    ) -> Result<(), BeyondLimit> {
+        let mut run = Run::default();
         let after = side.div_ceil(2);
         let mut next = frame.rows.start;
         let mut hidden = false;
         for y in self.rows.clone() {
             while next < (y + after + 1).min(self.image.height) {
                 // SAFETY: as the caller's.
-                let news = unsafe {
-                    planes.push::<S>(self.points, frame, next, self.limit, self.whole_points)
-                };
-                if news.beyond {
+                let news = unsafe { planes.push::<S>(self.points, frame, next, self.whole_points) };
+                if M::LIMITED && news.largest > limit {
                     return Err(BeyondLimit);
                 }
                 hidden |= news.hidden;
