@@ -318,7 +318,7 @@ pub(crate) struct PointRow<'a> {
 }
 
 impl PointRow<'_> {
-    /// x, y and z of eight points from the `at`-th on; zeros for those behind the last. Asks for those two rows below,
+    /// x, y and z of eight points from the `at`-th on; NaN for those behind the last. Asks for those two rows below,
     /// as rows are read downwards.
     ///
     /// # Safety
@@ -352,7 +352,7 @@ impl PointRow<'_> {
 
     /// [`PointRow::group`], coordinate by coordinate.
     fn gather(&self, at: usize) -> [[f32; GROUP]; 3] {
-        let mut planes = [[0.0; GROUP]; 3];
+        let mut planes = [[f32::NAN; GROUP]; 3];
         for (lane, x) in self.columns.clone().skip(at).take(GROUP).enumerate() {
             let point = self.points.at(x, self.y);
             for c in 0..3 {

@@ -134,7 +134,8 @@ pub(crate) unsafe fn sum_between<S: Simd>(ring: *const f64, corners: &Corners) -
     }
 }
 
-/// The ring of x, y and z rows. Points that miss a coordinate are (0, 0, 0).
+/// The ring of x, y and z rows. In place of points that miss a coordinate, and of those behind a row's last, there is
+/// another one: no window holds it, but sums along rows and columns do.
 #[derive(Debug, Default)]
 pub(crate) struct Planes {
     data: Buffer<f32>,
@@ -178,7 +179,7 @@ impl Planes {
         [self.row(frame, 0, y), self.row(frame, 1, y), self.row(frame, 2, y)]
     }
 
-    /// Reads row `y` of the points.
+    /// Reads row `y` of the points, with `filler` for missing ones.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
@@ -189,13 +190,14 @@ impl Planes {
         frame: &Frame,
         y: usize,
         whole_points: bool,
+        filler: [f32; 3],
     ) -> RowNews {
         let start = frame.start(3, y);
         let row = &mut self.data[start..start + 3 * frame.stride];
         assert!(MARGIN + (frame.groups() + 1) * GROUP <= frame.stride);
         let points = points.row(y, frame.columns.clone(), whole_points);
         let xs = row[MARGIN..].as_mut_ptr();
-        // SAFETY: as the caller's; the groups, and one of zeros behind them, lie inside the planes.
+        // SAFETY: as the caller's; the groups, and one behind them, lie inside the planes.
         unsafe {
             let (ys, zs) = (xs.add(frame.stride), xs.add(2 * frame.stride));
             let mut hidden = S::splat(0.0);
@@ -206,7 +208,9 @@ impl Planes {
                 let finite_z = S::finite(z);
                 let finite = S::and(finite_z, S::and(S::finite(x), S::finite(y)));
                 hidden = S::or(hidden, S::and_not(finite, finite_z));
-                let (x, y, z) = (S::and(finite, x), S::and(finite, y), S::and(finite, z));
+                let x = S::select(finite, x, S::splat(filler[0]));
+                let y = S::select(finite, y, S::splat(filler[1]));
+                let z = S::select(finite, z, S::splat(filler[2]));
                 largest = S::max(largest, S::max(S::abs(x), S::abs(y)));
                 S::store(xs.add(at), x);
                 S::store(ys.add(at), y);

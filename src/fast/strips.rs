@@ -25,7 +25,10 @@ pub(crate) struct Strips<const SIMPLE: bool> {
     /// The row pushed last and the one before it, as integers.
     last: Buffer<i32>,
     above: Buffer<i32>,
+    origin: [f32; 3],
     scale: f32,
+    /// Of [`DOUBT_ROUNDING`].
+    doubt: f32,
     /// The place of the row pushed last; before the first the one after the ring, which is zero.
     pushed: usize,
     /// By the side of a window: its places.
@@ -73,11 +76,18 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
         make_room(&mut self.places, side + 1)
     }
 
-    fn start(&mut self, frame: &Frame, limit: f32, side: usize, _origin: [f32; 3]) {
+    fn start(&mut self, frame: &Frame, limit: f32, side: usize, origin: [f32; 3]) {
         self.pushed = frame.start_ring(3, &mut self.columns);
         self.last.fill(0); // it is what is above the first row
+        self.origin = origin;
         // 4 side limit scale < 2^31, and a power of two.
-        let bits = 29.0 - (f64::from(limit) * side as f64).log2();
+        let mut bits = 29.0 - (f64::from(limit) * side as f64).log2();
+        self.doubt = DOUBT_ROUNDING;
+        if origin != [0.0; 3] {
+            // The way from there is rounded to a float first: for limit scale < 2^25 that at most doubles the error.
+            bits = bits.min(25.0 - f64::from(limit).log2());
+            self.doubt *= 4.0;
+        }
         self.scale = bits.floor().clamp(-120.0, 120.0).exp2() as f32;
     }
 
@@ -105,11 +115,12 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
             );
             // SAFETY: as the caller's; the groups lie inside the rows, whose lengths were just checked.
             unsafe {
-                let scale = S::splat(self.scale);
+                let (origin, scale) = (S::splat(self.origin[c]), S::splat(self.scale));
                 let mut carry = S::splat_i(0);
                 for group in 0..groups {
                     let at = MARGIN + group * GROUP;
-                    let point = S::round_i(S::mul(S::load(from.add(at)), scale));
+                    let point = S::sub(S::load(from.add(at)), origin);
+                    let point = S::round_i(S::mul(point, scale));
                     S::store_i(last.as_mut_ptr().add(at), point);
                     let strip = if SIMPLE {
                         point
@@ -247,7 +258,7 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
             let [h, v] = [float::<S>([hx, hy, hz]), float::<S>([vx, vy, vz])];
             let n = cross(v, h);
             let (n2, h2, v2) = (dot(n, n), dot(h, h), dot(v, v));
-            let rounding = Floats(sides) * Floats::splat(DOUBT_ROUNDING) * (h2 + v2);
+            let rounding = Floats(sides) * Floats::splat(self.doubt) * (h2 + v2);
             let sine = h2 * v2 * Floats::splat(DOUBT_SINE);
             let scale = Floats::splat(1.0) / n2.sqrt();
             Found {

@@ -54,7 +54,7 @@ pub(crate) trait Sums {
     /// Whether the method gives a curvature.
     const CURVATURE: bool;
 
-    /// Whether sums go wrong where a coordinate is beyond the limit.
+    /// Whether sums go wrong where a coordinate is beyond the limit: the camera is the origin where that will do.
     const LIMITED: bool;
 
     /// Whether pairs of groups are summed as such: not where a group's sums fill the registers.
@@ -63,8 +63,8 @@ pub(crate) trait Sums {
     /// Makes room for frames that are no larger, and windows of up to `side`.
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error>;
 
-    /// Forgets the rows pushed before. `limit` bounds the depths, and where the method is [`Sums::LIMITED`] all
-    /// coordinates; `side` the windows.
+    /// Forgets the rows pushed before. `side` bounds the windows, `limit` the depths, and where the method is
+    /// [`Sums::LIMITED`] all coordinates, counted from the origin.
     fn start(&mut self, frame: &Frame, limit: f32, side: usize, origin: [f32; 3]);
 
     /// Bytes held.
@@ -176,7 +176,7 @@ pub(crate) struct Tile<'a> {
     pub whole_points: bool,
 }
 
-/// A coordinate that is larger than the limit, where the method has one.
+/// A point farther from the camera's axis than the sums allow.
 struct BeyondLimit;
 
 impl Tile<'_> {
@@ -208,22 +208,57 @@ impl Tile<'_> {
         let size = (self.image.width, self.image.height);
         *frame = Frame::around(&self.columns, &self.rows, side, size);
         let origin = self.origin(sides);
-        // Seldom is a point farther from the camera's axis than the deepest one from the camera.
-        let mut limit = self.deepest;
+        let mut limit = f32::INFINITY;
+        if M::LIMITED {
+            // Seldom is a point farther from the camera's axis than the deepest one from the camera.
+            limit = self.deepest;
+            sums.start(frame, limit, side, [0.0; 3]);
+        } else {
+            sums.start(frame, self.deepest, side, origin);
+        }
         loop {
-            sums.start(frame, limit, side, origin);
             // SAFETY: as the caller's.
-            let done = unsafe { self.rows::<S, M>(frame, planes, sums, sides, sink, side, limit) };
+            let done =
+                unsafe { self.rows::<S, M>(frame, planes, sums, sides, sink, side, origin, limit) };
             let Err(BeyondLimit) = done else { break };
-            for y in frame.rows.clone() {
-                // SAFETY: as the caller's.
-                let news = unsafe { planes.push::<S>(self.points, frame, y, self.whole_points) };
-                limit = limit.max(news.largest);
+            // SAFETY: as the caller's.
+            let extent = unsafe { self.extent::<S>(frame, planes, origin) };
+            if extent.is_finite() {
+                sums.start(frame, extent, side, origin);
+            } else {
+                sums.start(frame, f32::MAX, side, [0.0; 3]);
             }
+            limit = f32::INFINITY;
         }
     }
 
-    /// Computes all rows; what was written before a coordinate was beyond the limit must be written again.
+    /// The largest magnitude of a coordinate in the frame, counted from the origin.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn extent<S: Groups>(
+        &self,
+        frame: &Frame,
+        planes: &mut Planes,
+        origin: [f32; 3],
+    ) -> f32 {
+        // As bits, which are in the order of positive floats.
+        let mut largest = 0;
+        for y in frame.rows.clone() {
+            // SAFETY: as the caller's.
+            unsafe { planes.push::<S>(self.points, frame, y, self.whole_points, origin) };
+            for (plane, origin) in planes.rows(frame, y).into_iter().zip(origin) {
+                let row = &plane[MARGIN..MARGIN + frame.columns.len()];
+                let bits = row.iter().map(|at| (at - origin).abs().to_bits());
+                largest = bits.fold(largest, u32::max);
+            }
+        }
+        f32::from_bits(largest)
+    }
+
+    /// Computes all rows, with the origin in place of missing points; what was written before x or y of a point was
+    /// beyond the limit must be written again.
     ///
     /// # Safety
     /// As [`Tile::compute`].
@@ -237,6 +272,7 @@ impl Tile<'_> {
         sides: &impl Fn(usize) -> &'r [f32],
         sink: &Sink,
         side: usize,
+        origin: [f32; 3],
         limit: f32,
     ) -> Result<(), BeyondLimit> {
         let mut run = Run::default();
@@ -246,8 +282,10 @@ impl Tile<'_> {
         for y in self.rows.clone() {
             while next < (y + after + 1).min(self.image.height) {
                 // SAFETY: as the caller's.
-                let news = unsafe { planes.push::<S>(self.points, frame, next, self.whole_points) };
-                if M::LIMITED && news.largest > limit {
+                let news = unsafe {
+                    planes.push::<S>(self.points, frame, next, self.whole_points, origin)
+                };
+                if news.largest > limit {
                     return Err(BeyondLimit);
                 }
                 hidden |= news.hidden;
