@@ -208,14 +208,10 @@ impl Tile<'_> {
         let size = (self.image.width, self.image.height);
         *frame = Frame::around(&self.columns, &self.rows, side, size);
         let origin = self.origin(sides);
-        let mut limit = f32::INFINITY;
-        if M::LIMITED {
-            // Seldom is a point farther from the camera's axis than the deepest one from the camera.
-            limit = self.deepest;
-            sums.start(frame, limit, side, [0.0; 3]);
-        } else {
-            sums.start(frame, self.deepest, side, origin);
-        }
+        // Seldom is a point farther from the camera's axis than the deepest one from the camera.
+        let (first, mut limit) =
+            if M::LIMITED { ([0.0; 3], self.deepest) } else { (origin, f32::INFINITY) };
+        sums.start(frame, self.deepest, side, first);
         loop {
             // SAFETY: as the caller's.
             let done =
