@@ -9,8 +9,8 @@
 //! A cloud far from the camera's origin, as in a map's frame, may take a quarter more.
 //!
 //! The program runs itself under valgrind: `frames N SEMANTICS METHOD POLICY METRES` computes N frames of a cloud that is
-//! moved to the right by so much. The counts are the
-//! difference between two frames and one, so neither start nor the first frame's allocations are in them.
+//! moved to the right by so much. The counts are the difference between two frames and one, so neither start nor the
+//! first frame's allocations are in them.
 
 #[path = "../benches/common/mod.rs"]
 mod common;

@@ -146,7 +146,7 @@ pub(crate) struct Planes {
 pub(crate) struct RowNews {
     /// A point has a finite z but not a finite x or y: no depth change tells of it.
     pub hidden: bool,
-    /// The largest magnitude of x or y of a finite point.
+    /// The largest magnitude of x or y of a finite point, or of the filler.
     pub largest: f32,
 }
 

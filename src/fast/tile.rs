@@ -171,7 +171,7 @@ pub(crate) struct Tile<'a> {
     /// The pixels to compute; the first column is a multiple of the group.
     pub columns: Range<usize>,
     pub rows: Range<usize>,
-    /// No finite depth is larger.
+    /// No finite depth's magnitude is larger.
     pub deepest: f32,
     pub whole_points: bool,
 }
@@ -222,6 +222,7 @@ impl Tile<'_> {
             if extent.is_finite() {
                 sums.start(frame, extent, side, origin);
             } else {
+                // Floats do not hold the way from there.
                 sums.start(frame, f32::MAX, side, [0.0; 3]);
             }
             limit = f32::INFINITY;
