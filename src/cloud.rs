@@ -8,7 +8,7 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 use crate::Error;
-use crate::simd::{GROUP, Groups};
+use crate::simd::{Along, GROUP};
 
 /// The geometry that all fields of a view share. Strides are in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -304,7 +304,7 @@ impl<'a> Points<'a> {
     }
 }
 
-/// Points of a row, to be read eight at a time.
+/// Points of a row, to be read as many at a time as there are lanes.
 pub(crate) struct PointRow<'a> {
     points: &'a Points<'a>,
     y: usize,
@@ -318,42 +318,34 @@ pub(crate) struct PointRow<'a> {
 }
 
 impl PointRow<'_> {
-    /// x, y and z of eight points from the `at`-th on; NaN for those behind the last. Asks for those two rows below,
-    /// as rows are read downwards.
+    /// x, y and z of as many points as there are lanes, from the `at`-th on; NaN for those behind the last. Asks for
+    /// those two rows below, as rows are read downwards.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn group<S: Groups>(&self, at: usize) -> [S::F; 3] {
-        prefetch(self.first.wrapping_byte_add(self.below + at * self.step), GROUP * self.step);
-        // SAFETY: as the caller's; eight points are inside the row, and of those that are read whole none is its last.
+    pub unsafe fn group<S: Along>(&self, at: usize) -> [S::F; 3] {
+        prefetch(self.first.wrapping_byte_add(self.below + at * self.step), S::LANES * self.step);
+        // SAFETY: as the caller's; the points are inside the row, and of those that are read whole none is its last.
         unsafe {
-            if at + GROUP <= self.whole {
-                let low = self.first.byte_add(at * self.step);
-                let high = low.byte_add(4 * self.step);
-                let [x, y, z, _] = S::transpose_halves([
-                    S::load_halves(low, high),
-                    S::load_halves(low.byte_add(self.step), high.byte_add(self.step)),
-                    S::load_halves(low.byte_add(2 * self.step), high.byte_add(2 * self.step)),
-                    S::load_halves(low.byte_add(3 * self.step), high.byte_add(3 * self.step)),
-                ]);
-                return [x, y, z];
+            if at + S::LANES <= self.whole {
+                return S::load_points(self.first.byte_add(at * self.step), self.step);
             }
-            if self.step == FIELD && at + GROUP <= self.columns.len() {
+            if self.step == FIELD && at + S::LANES <= self.columns.len() {
                 let place = self.points.grid.offset(self.columns.start + at, self.y);
                 let Points { x, y, z, .. } = *self.points;
                 let [x, y, z] = [x, y, z].map(|field| field.byte_add(place));
                 return [S::load(x), S::load(y), S::load(z)];
             }
-            let [x, y, z] = self.gather(at);
+            let [x, y, z] = self.gather(at, S::LANES);
             [S::load(x.as_ptr()), S::load(y.as_ptr()), S::load(z.as_ptr())]
         }
     }
 
     /// [`PointRow::group`], coordinate by coordinate.
-    fn gather(&self, at: usize) -> [[f32; GROUP]; 3] {
-        let mut planes = [[f32::NAN; GROUP]; 3];
-        for (lane, x) in self.columns.clone().skip(at).take(GROUP).enumerate() {
+    fn gather(&self, at: usize, lanes: usize) -> [[f32; 2 * GROUP]; 3] {
+        let mut planes = [[f32::NAN; 2 * GROUP]; 3];
+        for (lane, x) in self.columns.clone().skip(at).take(lanes).enumerate() {
             let point = self.points.at(x, self.y);
             for c in 0..3 {
                 planes[c][lane] = point[c];

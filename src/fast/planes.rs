@@ -6,7 +6,7 @@ use super::arithmetic::Doubles;
 use super::buffer::{Buffer, Number};
 use crate::Error;
 use crate::cloud::Points;
-use crate::simd::{GROUP, Groups, Simd};
+use crate::simd::{Along, GROUP, Simd};
 
 /// Columns before and after a row's own, so that groups and the column before the first need no special case.
 pub(crate) const MARGIN: usize = GROUP;
@@ -26,7 +26,7 @@ pub(crate) struct Frame {
 
 impl Frame {
     fn new(columns: Range<usize>, rows: Range<usize>, side: usize) -> Self {
-        let stride = (columns.len() + 2 * MARGIN).next_multiple_of(GROUP) + MARGIN;
+        let stride = (columns.len() + 2 * MARGIN).next_multiple_of(2 * GROUP) + MARGIN;
         Frame { columns, stride, ring: Self::ring(side), rows }
     }
 
@@ -55,9 +55,9 @@ impl Frame {
         Frame::new(0..(GROUP + columns + side + 2).min(width), 0..0, side)
     }
 
-    /// Groups that cover the columns.
-    pub fn groups(&self) -> usize {
-        self.columns.len().div_ceil(GROUP)
+    /// How often lanes cover the columns and a group behind them.
+    pub fn along<S: Simd>(&self) -> usize {
+        (self.columns.len().next_multiple_of(GROUP) + GROUP).div_ceil(S::LANES)
     }
 
     /// The ring's row in which row `y` is held while it is.
@@ -184,7 +184,7 @@ impl Planes {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn push<S: Groups>(
+    pub unsafe fn push<S: Along>(
         &mut self,
         points: &Points,
         frame: &Frame,
@@ -194,16 +194,16 @@ impl Planes {
     ) -> RowNews {
         let start = frame.start(3, y);
         let row = &mut self.data[start..start + 3 * frame.stride];
-        assert!(MARGIN + (frame.groups() + 1) * GROUP <= frame.stride);
+        assert!(MARGIN + frame.along::<S>() * S::LANES <= frame.stride);
         let points = points.row(y, frame.columns.clone(), whole_points);
         let xs = row[MARGIN..].as_mut_ptr();
-        // SAFETY: as the caller's; the groups, and one behind them, lie inside the planes.
+        // SAFETY: as the caller's; all lanes, and a group behind the columns, lie inside the planes.
         unsafe {
             let (ys, zs) = (xs.add(frame.stride), xs.add(2 * frame.stride));
             let mut hidden = S::splat(0.0);
             let mut largest = S::splat(0.0);
-            for group in 0..frame.groups() + 1 {
-                let at = group * GROUP;
+            for number in 0..frame.along::<S>() {
+                let at = number * S::LANES;
                 let [x, y, z] = points.group::<S>(at);
                 let finite_z = S::finite(z);
                 let finite = S::and(finite_z, S::and(S::finite(x), S::finite(y)));
@@ -216,7 +216,7 @@ impl Planes {
                 S::store(ys.add(at), y);
                 S::store(zs.add(at), z);
             }
-            let mut lanes = [0.0; GROUP];
+            let mut lanes = [0.0; 2 * GROUP];
             S::store(lanes.as_mut_ptr(), largest);
             RowNews { hidden: S::bits(hidden) != 0, largest: lanes.into_iter().fold(0.0, f32::max) }
         }

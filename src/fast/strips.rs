@@ -12,7 +12,7 @@ use super::run::OfRun;
 use super::tile::{Found, Sums};
 use crate::Error;
 use crate::memory::{bytes, make_room};
-use crate::simd::{GROUP, Groups, Simd};
+use crate::simd::{Along, Groups, Simd};
 use crate::window::Image;
 
 /// The rings of AVERAGE_3D_GRADIENT (`SIMPLE` false), whose strips are pairs of columns and of rows, or of
@@ -47,6 +47,58 @@ const DOUBT_ROUNDING: f32 = 4e8;
 const DOUBT_SINE: f32 = 1e-6;
 
 impl<const SIMPLE: bool> Strips<SIMPLE> {
+    /// Adds row `y` of the planes.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn push_row<S: Along>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
+        std::mem::swap(&mut self.last, &mut self.above);
+        let count = frame.along::<S>();
+        for c in 0..3 {
+            let start = c * frame.stride;
+            let own = frame.start(3, y) + start;
+            let above = frame.start_of(3, self.pushed) + start;
+            let from = planes.row(frame, c, y).as_ptr();
+            let last = &mut self.last[start..start + frame.stride];
+            let pair = &self.above[start..start + frame.stride];
+            let rows = &mut self.rows[own..own + frame.stride];
+            assert!(
+                MARGIN + count * S::LANES <= frame.stride
+                    && own.max(above) + frame.stride <= self.columns.len()
+            );
+            // SAFETY: as the caller's; the groups lie inside the rows, whose lengths were just checked.
+            unsafe {
+                let (origin, scale) = (S::splat(self.origin[c]), S::splat(self.scale));
+                let mut carry = S::splat_i(0);
+                for number in 0..count {
+                    let at = MARGIN + number * S::LANES;
+                    let point = S::sub(S::load(from.add(at)), origin);
+                    let point = S::round_i(S::mul(point, scale));
+                    S::store_i(last.as_mut_ptr().add(at), point);
+                    let strip = if SIMPLE {
+                        point
+                    } else {
+                        S::add_i(point, S::load_i(pair.as_ptr().add(at)))
+                    };
+                    let sum = S::running_sum_i(strip, &mut carry);
+                    S::store_i(rows.as_mut_ptr().add(at), sum);
+                }
+                let columns = self.columns.as_mut_ptr();
+                for number in 0..count {
+                    let at = MARGIN + number * S::LANES;
+                    let mut strip = S::load_i(last.as_ptr().add(at));
+                    if !SIMPLE {
+                        strip = S::add_i(strip, S::load_i(last.as_ptr().add(at - 1)));
+                    }
+                    strip = S::add_i(strip, S::load_i(columns.add(above + at)));
+                    S::store_i(columns.add(own + at), strip);
+                }
+            }
+        }
+        self.pushed = frame.place(y);
+    }
+
     /// The sum between two columns' strips over the window's rows, and between two rows' strips over its columns: the
     /// prefix sums end before the window and with it.
     fn places(frame: &Frame, y: usize, side: usize) -> Places {
@@ -99,50 +151,8 @@ impl<const SIMPLE: bool> Sums for Strips<SIMPLE> {
 
     #[inline(always)]
     unsafe fn push<S: Groups>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
-        std::mem::swap(&mut self.last, &mut self.above);
-        let groups = frame.groups() + 1; // the strips' groups may reach one further
-        for c in 0..3 {
-            let start = c * frame.stride;
-            let own = frame.start(3, y) + start;
-            let above = frame.start_of(3, self.pushed) + start;
-            let from = planes.row(frame, c, y).as_ptr();
-            let last = &mut self.last[start..start + frame.stride];
-            let pair = &self.above[start..start + frame.stride];
-            let rows = &mut self.rows[own..own + frame.stride];
-            assert!(
-                MARGIN + groups * GROUP <= frame.stride
-                    && own.max(above) + frame.stride <= self.columns.len()
-            );
-            // SAFETY: as the caller's; the groups lie inside the rows, whose lengths were just checked.
-            unsafe {
-                let (origin, scale) = (S::splat(self.origin[c]), S::splat(self.scale));
-                let mut carry = S::splat_i(0);
-                for group in 0..groups {
-                    let at = MARGIN + group * GROUP;
-                    let point = S::sub(S::load(from.add(at)), origin);
-                    let point = S::round_i(S::mul(point, scale));
-                    S::store_i(last.as_mut_ptr().add(at), point);
-                    let strip = if SIMPLE {
-                        point
-                    } else {
-                        S::add_i(point, S::load_i(pair.as_ptr().add(at)))
-                    };
-                    let sum = S::running_sum_i(strip, &mut carry);
-                    S::store_i(rows.as_mut_ptr().add(at), sum);
-                }
-                let columns = self.columns.as_mut_ptr();
-                for group in 0..groups {
-                    let at = MARGIN + group * GROUP;
-                    let mut strip = S::load_i(last.as_ptr().add(at));
-                    if !SIMPLE {
-                        strip = S::add_i(strip, S::load_i(last.as_ptr().add(at - 1)));
-                    }
-                    strip = S::add_i(strip, S::load_i(columns.add(above + at)));
-                    S::store_i(columns.add(own + at), strip);
-                }
-            }
-        }
-        self.pushed = frame.place(y);
+        // SAFETY: as the caller's.
+        unsafe { self.push_row::<S::Widest>(frame, planes, y) };
     }
 
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {

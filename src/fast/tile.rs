@@ -244,7 +244,7 @@ impl Tile<'_> {
         let mut largest = 0;
         for y in frame.rows.clone() {
             // SAFETY: as the caller's.
-            unsafe { planes.push::<S>(self.points, frame, y, self.whole_points, origin) };
+            unsafe { planes.push::<S::Widest>(self.points, frame, y, self.whole_points, origin) };
             for (plane, origin) in planes.rows(frame, y).into_iter().zip(origin) {
                 let row = &plane[MARGIN..MARGIN + frame.columns.len()];
                 let bits = row.iter().map(|at| (at - origin).abs().to_bits());
@@ -280,7 +280,7 @@ impl Tile<'_> {
             while next < (y + after + 1).min(self.image.height) {
                 // SAFETY: as the caller's.
                 let news = unsafe {
-                    planes.push::<S>(self.points, frame, next, self.whole_points, origin)
+                    planes.push::<S::Widest>(self.points, frame, next, self.whole_points, origin)
                 };
                 if news.largest > limit {
                     return Err(BeyondLimit);

@@ -7,7 +7,7 @@ use std::arch::x86_64::*;
 
 use super::twice::Twice;
 use super::x86::Avx2;
-use super::{GROUP, Groups, Simd};
+use super::{Along, GROUP, Groups, Simd, load_points_by_fours};
 
 /// AVX-512 (F, VL, DQ, BW), on processors that have it.
 #[derive(Clone, Copy)]
@@ -95,26 +95,28 @@ impl Simd for Avx512 {
     }
 }
 
+impl Along for Avx512 {
+    calls! {
+        load_fours(place: impl Fn(usize) -> *const f32) -> Self::F = Avx2::load_fours;
+        transpose_fours(rows: [Self::F; 4]) -> [Self::F; 4] = Avx2::transpose_fours;
+        prefix_sum_i(a: Self::I) -> Self::I = Avx2::prefix_sum_i;
+        last_i(a: Self::I) -> Self::I = Avx2::last_i;
+    }
+}
+
 impl Groups for Avx512 {
     type Pair = Avx512Pair;
     type Widest = Self::Pair;
 
-    calls! {
-        load_halves(low: *const f32, high: *const f32) -> Self::F = Avx2::load_halves;
-        transpose_halves(rows: [Self::F; 4]) -> [Self::F; 4] = Avx2::transpose_halves;
-        prefix_sum_i(a: Self::I) -> Self::I = Avx2::prefix_sum_i;
-        last_i(a: Self::I) -> Self::I = Avx2::last_i;
-    }
-
     #[inline(always)]
-    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
+    unsafe fn load_fours_d(place: impl Fn(usize) -> *const f64) -> Self::D {
         unsafe {
-            let low = _mm512_castpd256_pd512(_mm256_loadu_pd(low));
-            _mm512_insertf64x4::<1>(low, _mm256_loadu_pd(high))
+            let low = _mm512_castpd256_pd512(_mm256_loadu_pd(place(0)));
+            _mm512_insertf64x4::<1>(low, _mm256_loadu_pd(place(1)))
         }
     }
     #[inline(always)]
-    unsafe fn transpose_halves_d([a, b, c, d]: [Self::D; 4]) -> [Self::D; 4] {
+    unsafe fn transpose_fours_d([a, b, c, d]: [Self::D; 4]) -> [Self::D; 4] {
         unsafe {
             let (ab_even, cd_even) = (_mm512_unpacklo_pd(a, b), _mm512_unpacklo_pd(c, d));
             let (ab_odd, cd_odd) = (_mm512_unpackhi_pd(a, b), _mm512_unpackhi_pd(c, d));
@@ -233,5 +235,64 @@ impl Simd for Avx512Pair {
             let low = _mm512_castps256_ps512(Avx512::narrow(a[0]));
             _mm512_insertf32x8::<1>(low, Avx512::narrow(a[1]))
         }
+    }
+}
+
+impl Along for Avx512Pair {
+    #[inline(always)]
+    unsafe fn load_fours(place: impl Fn(usize) -> *const f32) -> Self::F {
+        unsafe {
+            let fours = _mm512_castps128_ps512(_mm_loadu_ps(place(0)));
+            let fours = _mm512_insertf32x4::<1>(fours, _mm_loadu_ps(place(1)));
+            let fours = _mm512_insertf32x4::<2>(fours, _mm_loadu_ps(place(2)));
+            _mm512_insertf32x4::<3>(fours, _mm_loadu_ps(place(3)))
+        }
+    }
+    #[inline(always)]
+    unsafe fn transpose_fours([a, b, c, d]: [Self::F; 4]) -> [Self::F; 4] {
+        unsafe {
+            let (ab_low, cd_low) = (_mm512_unpacklo_ps(a, b), _mm512_unpacklo_ps(c, d));
+            let (ab_high, cd_high) = (_mm512_unpackhi_ps(a, b), _mm512_unpackhi_ps(c, d));
+            [
+                _mm512_shuffle_ps::<0x44>(ab_low, cd_low),
+                _mm512_shuffle_ps::<0xee>(ab_low, cd_low),
+                _mm512_shuffle_ps::<0x44>(ab_high, cd_high),
+                _mm512_shuffle_ps::<0xee>(ab_high, cd_high),
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
+        unsafe {
+            if step != size_of::<[f32; 4]>() {
+                return load_points_by_fours::<Self>(first, step);
+            }
+            let [a, b, c, d] = [0, 1, 2, 3].map(|i| _mm512_loadu_ps(first.add(16 * i)));
+            // Of eight points: x and y, or z.
+            let xy = _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);
+            let z = _mm512_setr_epi32(2, 6, 10, 14, 18, 22, 26, 30, 0, 0, 0, 0, 0, 0, 0, 0);
+            let (xy_ab, xy_cd) =
+                (_mm512_permutex2var_ps(a, xy, b), _mm512_permutex2var_ps(c, xy, d));
+            let (z_ab, z_cd) = (_mm512_permutex2var_ps(a, z, b), _mm512_permutex2var_ps(c, z, d));
+            [
+                _mm512_shuffle_f32x4::<0x44>(xy_ab, xy_cd),
+                _mm512_shuffle_f32x4::<0xee>(xy_ab, xy_cd),
+                _mm512_shuffle_f32x4::<0x44>(z_ab, z_cd),
+            ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn prefix_sum_i(a: Self::I) -> Self::I {
+        unsafe {
+            let zero = _mm512_setzero_si512();
+            let a = _mm512_add_epi32(a, _mm512_alignr_epi32::<15>(a, zero));
+            let a = _mm512_add_epi32(a, _mm512_alignr_epi32::<14>(a, zero));
+            let a = _mm512_add_epi32(a, _mm512_alignr_epi32::<12>(a, zero));
+            _mm512_add_epi32(a, _mm512_alignr_epi32::<8>(a, zero))
+        }
+    }
+    #[inline(always)]
+    unsafe fn last_i(a: Self::I) -> Self::I {
+        unsafe { _mm512_permutexvar_epi32(_mm512_set1_epi32(15), a) }
     }
 }

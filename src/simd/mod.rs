@@ -123,34 +123,27 @@ pub(crate) trait Simd: Copy {
     }
 }
 
-/// Groups of eight lanes, and what is done with them alone.
+/// As many lanes as a register of floats has, but no fewer than a group: what goes along a row.
 ///
 /// # Safety
 /// As [`Simd`].
-pub(crate) trait Groups: Simd {
-    /// Two groups side by side, the first one's lanes first: in wider registers, if there are any, else [`Twice`] as
-    /// many operations that do not wait for one another.
-    ///
-    /// [`Twice`]: twice::Twice
-    type Pair: Simd;
-    /// As many lanes as a register of floats has, but no fewer than a group.
-    type Widest: Simd;
+pub(crate) trait Along: Simd {
+    /// Four lanes from the first place, four from the next, and so on.
+    unsafe fn load_fours(place: impl Fn(usize) -> *const f32) -> Self::F;
+    /// Lane i of row j becomes lane j of row i, among each four lanes.
+    unsafe fn transpose_fours(rows: [Self::F; 4]) -> [Self::F; 4];
 
-    /// Lanes 0 to 3 from one place, 4 to 7 from another.
-    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F;
-    /// Lane i of row j becomes lane j of row i, among lanes 0 to 3 and among lanes 4 to 7.
-    unsafe fn transpose_halves(rows: [Self::F; 4]) -> [Self::F; 4];
-    /// Lanes 0 to 3 from one place, 4 to 7 from another.
-    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D;
-    /// As [`Groups::transpose_halves`].
-    unsafe fn transpose_halves_d(rows: [Self::D; 4]) -> [Self::D; 4];
+    /// The first, second and third of each four floats, `step` bytes from one lane's to the next one's.
+    #[inline(always)]
+    unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
+        // SAFETY: as the caller's.
+        unsafe { load_points_by_fours::<Self>(first, step) }
+    }
 
     /// Lane l becomes the sum of lanes 0 to l.
     unsafe fn prefix_sum_i(a: Self::I) -> Self::I;
     /// Every lane takes the value of the last one.
     unsafe fn last_i(a: Self::I) -> Self::I;
-    unsafe fn prefix_sum_d(a: Self::D) -> Self::D;
-    unsafe fn last_d(a: Self::D) -> Self::D;
 
     /// The prefix sums, going on from `carry`, which becomes the last one: it waits for one addition only, not for
     /// the prefix sums.
@@ -164,8 +157,51 @@ pub(crate) trait Groups: Simd {
             running
         }
     }
+}
 
-    /// As [`Groups::running_sum_i`].
+/// [`Along::load_points`]
+///
+/// # Safety
+/// As [`Simd`].
+#[inline(always)]
+unsafe fn load_points_by_fours<S: Along>(first: *const f32, step: usize) -> [S::F; 3] {
+    // SAFETY: as the caller's.
+    unsafe {
+        let point = |i: usize| first.byte_add(i * step);
+        let [x, y, z, _] = S::transpose_fours([
+            S::load_fours(|four| point(4 * four)),
+            S::load_fours(|four| point(4 * four + 1)),
+            S::load_fours(|four| point(4 * four + 2)),
+            S::load_fours(|four| point(4 * four + 3)),
+        ]);
+        [x, y, z]
+    }
+}
+
+/// Groups of eight lanes, and what is done with them alone.
+///
+/// # Safety
+/// As [`Simd`].
+pub(crate) trait Groups: Along {
+    /// Two groups side by side, the first one's lanes first: in wider registers, if there are any, else [`Twice`] as
+    /// many operations that do not wait for one another.
+    ///
+    /// [`Twice`]: twice::Twice
+    type Pair: Simd;
+    /// As many lanes as a register of floats has, but no fewer than a group.
+    type Widest: Along;
+
+    /// As [`Along::load_fours`].
+    unsafe fn load_fours_d(place: impl Fn(usize) -> *const f64) -> Self::D;
+    /// As [`Along::transpose_fours`].
+    unsafe fn transpose_fours_d(rows: [Self::D; 4]) -> [Self::D; 4];
+
+    /// As [`Along::prefix_sum_i`].
+    unsafe fn prefix_sum_d(a: Self::D) -> Self::D;
+    /// As [`Along::last_i`].
+    unsafe fn last_d(a: Self::D) -> Self::D;
+
+    /// As [`Along::running_sum_i`].
     #[inline(always)]
     unsafe fn running_sum_d(a: Self::D, carry: &mut Self::D) -> Self::D {
         // SAFETY: as the caller's.

@@ -6,7 +6,7 @@
 use std::arch::aarch64::*;
 
 use super::twice::Twice;
-use super::{GROUP, Groups, Simd};
+use super::{Along, GROUP, Groups, Simd};
 
 /// What every 64-bit Arm has.
 #[derive(Clone, Copy)]
@@ -293,16 +293,13 @@ impl Simd for Neon {
     }
 }
 
-impl Groups for Neon {
-    type Pair = Twice<Self>;
-    type Widest = Self;
-
+impl Along for Neon {
     #[inline(always)]
-    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {
-        unsafe { [vld1q_f32(low), vld1q_f32(high)] }
+    unsafe fn load_fours(place: impl Fn(usize) -> *const f32) -> Self::F {
+        unsafe { [vld1q_f32(place(0)), vld1q_f32(place(1))] }
     }
     #[inline(always)]
-    unsafe fn transpose_halves(rows: [Self::F; 4]) -> [Self::F; 4] {
+    unsafe fn transpose_fours(rows: [Self::F; 4]) -> [Self::F; 4] {
         let [a, b, c, d] = rows;
         let mut columns = rows;
         for half in 0..2 {
@@ -315,26 +312,6 @@ impl Groups for Neon {
                 columns[1][half] = vreinterpretq_f32_f64(vtrn1q_f64(ab_odd, cd_odd));
                 columns[2][half] = vreinterpretq_f32_f64(vtrn2q_f64(ab_even, cd_even));
                 columns[3][half] = vreinterpretq_f32_f64(vtrn2q_f64(ab_odd, cd_odd));
-            }
-        }
-        columns
-    }
-    #[inline(always)]
-    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
-        unsafe { [vld1q_f64(low), vld1q_f64(low.add(2)), vld1q_f64(high), vld1q_f64(high.add(2))] }
-    }
-    #[inline(always)]
-    unsafe fn transpose_halves_d(rows: [Self::D; 4]) -> [Self::D; 4] {
-        let [a, b, c, d] = rows;
-        let mut columns = rows;
-        for half in [0, 2] {
-            for i in 0..2 {
-                unsafe {
-                    columns[2 * i][half] = vtrn1q_f64(a[half + i], b[half + i]);
-                    columns[2 * i][half + 1] = vtrn1q_f64(c[half + i], d[half + i]);
-                    columns[2 * i + 1][half] = vtrn2q_f64(a[half + i], b[half + i]);
-                    columns[2 * i + 1][half + 1] = vtrn2q_f64(c[half + i], d[half + i]);
-                }
             }
         }
         columns
@@ -357,6 +334,35 @@ impl Groups for Neon {
     #[inline(always)]
     unsafe fn last_i(a: Self::I) -> Self::I {
         unsafe { [vdupq_laneq_s32::<3>(a[1]); 2] }
+    }
+}
+
+impl Groups for Neon {
+    type Pair = Twice<Self>;
+    type Widest = Self;
+
+    #[inline(always)]
+    unsafe fn load_fours_d(place: impl Fn(usize) -> *const f64) -> Self::D {
+        unsafe {
+            let two = |i: usize| place(i / 2).add(i % 2 * 2);
+            [vld1q_f64(two(0)), vld1q_f64(two(1)), vld1q_f64(two(2)), vld1q_f64(two(3))]
+        }
+    }
+    #[inline(always)]
+    unsafe fn transpose_fours_d(rows: [Self::D; 4]) -> [Self::D; 4] {
+        let [a, b, c, d] = rows;
+        let mut columns = rows;
+        for half in [0, 2] {
+            for i in 0..2 {
+                unsafe {
+                    columns[2 * i][half] = vtrn1q_f64(a[half + i], b[half + i]);
+                    columns[2 * i][half + 1] = vtrn1q_f64(c[half + i], d[half + i]);
+                    columns[2 * i + 1][half] = vtrn2q_f64(a[half + i], b[half + i]);
+                    columns[2 * i + 1][half + 1] = vtrn2q_f64(c[half + i], d[half + i]);
+                }
+            }
+        }
+        columns
     }
     #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {

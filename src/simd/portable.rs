@@ -1,7 +1,7 @@
 //! Eight lanes without any instruction set: what processors without a path of their own use.
 
 use super::twice::Twice;
-use super::{GROUP, Groups, Simd};
+use super::{Along, GROUP, Groups, Simd};
 
 #[derive(Clone, Copy)]
 pub(crate) struct Portable;
@@ -49,23 +49,16 @@ fn prefix_sum<T: Copy>(mut a: [T; GROUP], add: impl Fn(T, T) -> T) -> [T; GROUP]
     a
 }
 
-/// A half from one place, the other from another.
-///
 /// # Safety
-/// Both are valid for reads of half a group.
+/// The places are valid for reads of four.
 #[inline(always)]
-unsafe fn load_halves<T: Copy + Default>(low: *const T, high: *const T) -> [T; GROUP] {
-    let mut lanes = [T::default(); GROUP];
+unsafe fn load_fours<T: Copy>(place: impl Fn(usize) -> *const T) -> [T; GROUP] {
     // SAFETY: promised by the caller.
-    unsafe {
-        lanes[..4].copy_from_slice(std::slice::from_raw_parts(low, 4));
-        lanes[4..].copy_from_slice(std::slice::from_raw_parts(high, 4));
-    }
-    lanes
+    std::array::from_fn(|lane| unsafe { place(lane / 4).add(lane % 4).read() })
 }
 
 #[inline(always)]
-fn transpose_halves<T: Copy>(rows: [[T; GROUP]; 4]) -> [[T; GROUP]; 4] {
+fn transpose_fours<T: Copy>(rows: [[T; GROUP]; 4]) -> [[T; GROUP]; 4] {
     let mut columns = rows;
     for (i, column) in columns.iter_mut().enumerate() {
         for (l, lane) in column.iter_mut().enumerate() {
@@ -251,27 +244,15 @@ impl Simd for Portable {
     }
 }
 
-impl Groups for Portable {
-    type Pair = Twice<Self>;
-    type Widest = Self;
-
+impl Along for Portable {
     #[inline(always)]
-    unsafe fn load_halves(low: *const f32, high: *const f32) -> F {
+    unsafe fn load_fours(place: impl Fn(usize) -> *const f32) -> F {
         // SAFETY: promised by the caller.
-        unsafe { load_halves(low, high) }
+        unsafe { load_fours(place) }
     }
     #[inline(always)]
-    unsafe fn transpose_halves(rows: [F; 4]) -> [F; 4] {
-        transpose_halves(rows)
-    }
-    #[inline(always)]
-    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> D {
-        // SAFETY: promised by the caller.
-        unsafe { load_halves(low, high) }
-    }
-    #[inline(always)]
-    unsafe fn transpose_halves_d(rows: [D; 4]) -> [D; 4] {
-        transpose_halves(rows)
+    unsafe fn transpose_fours(rows: [F; 4]) -> [F; 4] {
+        transpose_fours(rows)
     }
     #[inline(always)]
     unsafe fn prefix_sum_i(a: I) -> I {
@@ -280,6 +261,21 @@ impl Groups for Portable {
     #[inline(always)]
     unsafe fn last_i(a: I) -> I {
         [a[GROUP - 1]; GROUP]
+    }
+}
+
+impl Groups for Portable {
+    type Pair = Twice<Self>;
+    type Widest = Self;
+
+    #[inline(always)]
+    unsafe fn load_fours_d(place: impl Fn(usize) -> *const f64) -> D {
+        // SAFETY: promised by the caller.
+        unsafe { load_fours(place) }
+    }
+    #[inline(always)]
+    unsafe fn transpose_fours_d(rows: [D; 4]) -> [D; 4] {
+        transpose_fours(rows)
     }
     #[inline(always)]
     unsafe fn prefix_sum_d(a: D) -> D {

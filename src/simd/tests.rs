@@ -2,7 +2,7 @@
 
 use super::portable::Portable;
 use super::twice::Twice;
-use super::{GROUP, Groups, Simd};
+use super::{Along, GROUP, Groups, Simd};
 
 const FLOATS: [f32; 16] = [
     0.0,
@@ -144,12 +144,9 @@ unsafe fn of_groups<S: Groups>(a: &[f32; 16], b: &[f32; 16]) -> Results {
         let (x, y) = (S::load(a.as_ptr()), S::load(b.as_ptr()));
         let (dx, dy) = (S::widen(x), S::widen(y));
         let [i, _] = small::<S>([x, y]);
-        results.floats::<S>([S::load_halves(b.as_ptr().add(3), a.as_ptr().add(1))]);
-        results.floats::<S>(S::transpose_halves([x, y, S::add(x, x), S::add(y, y)]));
-        results.integers::<S>([S::prefix_sum_i(i), S::last_i(i)]);
         let doubles: [f64; 16] = std::array::from_fn(|l| f64::from(a[l]));
         results.doubles::<S>([
-            S::load_halves_d(doubles.as_ptr().add(3), doubles.as_ptr().add(9)),
+            S::load_fours_d(|i| doubles.as_ptr().add(3 + 6 * i)),
             // A zero's sign may get lost.
             S::add_d(
                 S::prefix_sum_d(S::mul_d(S::widen(S::float_i(i)), S::splat_d(0.1))),
@@ -157,9 +154,50 @@ unsafe fn of_groups<S: Groups>(a: &[f32; 16], b: &[f32; 16]) -> Results {
             ),
             S::last_d(dx),
         ]);
-        results.doubles::<S>(S::transpose_halves_d([dx, dy, S::add_d(dx, dx), S::add_d(dy, dy)]));
+        results.doubles::<S>(S::transpose_fours_d([dx, dy, S::add_d(dx, dx), S::add_d(dy, dy)]));
     }
     results
+}
+
+/// What goes along a row does as it says.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+unsafe fn assert_goes_along<S: Along>() {
+    let floats: [f32; 256] = std::array::from_fn(|i| i as f32);
+    let integers: [i32; 16] = std::array::from_fn(|i| (i as i32 - 5).pow(9));
+    let bits = |v: &f32| u64::from(v.to_bits());
+    let (mut found, mut expected) = (Results::default(), Results::default());
+    // SAFETY: as the caller's; all places are inside the floats.
+    unsafe {
+        let from = floats.as_ptr();
+        found.floats::<S>([S::load_fours(|four| from.add(101 - 7 * four))]);
+        expected.0.extend((0..S::LANES).map(|l| bits(&floats[101 - 7 * (l / 4) + l % 4])));
+
+        let rows = [0, 1, 2, 3].map(|row| S::load(from.add(16 * row)));
+        found.floats::<S>(S::transpose_fours(rows));
+        let lanes = (0..4).flat_map(|i| (0..S::LANES).map(move |l| 16 * (l % 4) + l / 4 * 4 + i));
+        expected.0.extend(lanes.map(|at| bits(&floats[at])));
+
+        for step in [3, 4, 5, 8] {
+            found.floats::<S>(S::load_points(from.add(1), step * size_of::<f32>()));
+            let lanes = (0..3).flat_map(|c| (0..S::LANES).map(move |l| 1 + l * step + c));
+            expected.0.extend(lanes.map(|at| bits(&floats[at])));
+        }
+
+        let mut carry = S::splat_i(7);
+        for _ in 0..2 {
+            found.integers::<S>([S::running_sum_i(S::load_i(integers.as_ptr()), &mut carry)]);
+        }
+        let mut sum = 7_i32;
+        for lane in (0..S::LANES).chain(0..S::LANES) {
+            sum = sum.wrapping_add(integers[lane]);
+            expected.0.push(sum as u64);
+        }
+        found.integers::<S>([carry]);
+        expected.0.extend((0..S::LANES).map(|_| sum as u64));
+    }
+    assert_eq!(found, expected);
 }
 
 /// Integers of numbers that fit, to the nearest and towards zero.
@@ -177,6 +215,11 @@ unsafe fn small<S: Simd>(values: [S::F; 2]) -> [S::I; 2] {
 /// # Safety
 /// The processor has the instruction set of `S`.
 unsafe fn assert_as_portable<S: Groups>() {
+    // SAFETY: as the caller's.
+    unsafe {
+        assert_goes_along::<S>();
+        assert_goes_along::<S::Widest>();
+    }
     for (a, b) in floats() {
         // SAFETY: as the caller's, and the portable path runs everywhere.
         unsafe {
@@ -195,6 +238,7 @@ fn operations_of_x86_equal_the_portable_ones() {
     use crate::isa::Isa;
     // SAFETY: SSE2 is part of every x86-64, and the others are there.
     unsafe {
+        assert_goes_along::<Portable>();
         assert_as_portable::<x86::Sse2>();
         if Isa::Avx2.is_available() {
             assert_as_portable::<x86::Avx2>();

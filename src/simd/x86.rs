@@ -6,7 +6,7 @@
 use std::arch::x86_64::*;
 
 use super::twice::Twice;
-use super::{GROUP, Groups, Simd};
+use super::{Along, GROUP, Groups, Simd};
 
 /// What every x86-64 has.
 #[derive(Clone, Copy)]
@@ -240,48 +240,18 @@ impl Simd for Sse2 {
     }
 }
 
-impl Groups for Sse2 {
-    type Pair = Twice<Self>;
-    type Widest = Self;
-
+impl Along for Sse2 {
     #[inline(always)]
-    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {
-        unsafe { [_mm_loadu_ps(low), _mm_loadu_ps(high)] }
+    unsafe fn load_fours(place: impl Fn(usize) -> *const f32) -> Self::F {
+        unsafe { [_mm_loadu_ps(place(0)), _mm_loadu_ps(place(1))] }
     }
     #[inline(always)]
-    unsafe fn transpose_halves(rows: [Self::F; 4]) -> [Self::F; 4] {
+    unsafe fn transpose_fours(rows: [Self::F; 4]) -> [Self::F; 4] {
         let [mut a, mut b, mut c, mut d] = rows;
         for half in 0..2 {
             unsafe { _MM_TRANSPOSE4_PS(&mut a[half], &mut b[half], &mut c[half], &mut d[half]) };
         }
         [a, b, c, d]
-    }
-    #[inline(always)]
-    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
-        unsafe {
-            [
-                _mm_loadu_pd(low),
-                _mm_loadu_pd(low.add(2)),
-                _mm_loadu_pd(high),
-                _mm_loadu_pd(high.add(2)),
-            ]
-        }
-    }
-    #[inline(always)]
-    unsafe fn transpose_halves_d(rows: [Self::D; 4]) -> [Self::D; 4] {
-        let [a, b, c, d] = rows;
-        let mut columns = rows;
-        for half in [0, 2] {
-            for i in 0..2 {
-                unsafe {
-                    columns[2 * i][half] = _mm_unpacklo_pd(a[half + i], b[half + i]);
-                    columns[2 * i][half + 1] = _mm_unpacklo_pd(c[half + i], d[half + i]);
-                    columns[2 * i + 1][half] = _mm_unpackhi_pd(a[half + i], b[half + i]);
-                    columns[2 * i + 1][half + 1] = _mm_unpackhi_pd(c[half + i], d[half + i]);
-                }
-            }
-        }
-        columns
     }
     #[inline(always)]
     unsafe fn prefix_sum_i(a: Self::I) -> Self::I {
@@ -300,6 +270,35 @@ impl Groups for Sse2 {
     #[inline(always)]
     unsafe fn last_i(a: Self::I) -> Self::I {
         unsafe { [_mm_shuffle_epi32::<0xff>(a[1]); 2] }
+    }
+}
+
+impl Groups for Sse2 {
+    type Pair = Twice<Self>;
+    type Widest = Self;
+
+    #[inline(always)]
+    unsafe fn load_fours_d(place: impl Fn(usize) -> *const f64) -> Self::D {
+        unsafe {
+            let two = |i: usize| place(i / 2).add(i % 2 * 2);
+            [_mm_loadu_pd(two(0)), _mm_loadu_pd(two(1)), _mm_loadu_pd(two(2)), _mm_loadu_pd(two(3))]
+        }
+    }
+    #[inline(always)]
+    unsafe fn transpose_fours_d(rows: [Self::D; 4]) -> [Self::D; 4] {
+        let [a, b, c, d] = rows;
+        let mut columns = rows;
+        for half in [0, 2] {
+            for i in 0..2 {
+                unsafe {
+                    columns[2 * i][half] = _mm_unpacklo_pd(a[half + i], b[half + i]);
+                    columns[2 * i][half + 1] = _mm_unpacklo_pd(c[half + i], d[half + i]);
+                    columns[2 * i + 1][half] = _mm_unpackhi_pd(a[half + i], b[half + i]);
+                    columns[2 * i + 1][half + 1] = _mm_unpackhi_pd(c[half + i], d[half + i]);
+                }
+            }
+        }
+        columns
     }
     #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
@@ -516,16 +515,13 @@ impl Simd for Avx2 {
     }
 }
 
-impl Groups for Avx2 {
-    type Pair = Twice<Self>;
-    type Widest = Self;
-
+impl Along for Avx2 {
     #[inline(always)]
-    unsafe fn load_halves(low: *const f32, high: *const f32) -> Self::F {
-        unsafe { _mm256_loadu2_m128(high, low) }
+    unsafe fn load_fours(place: impl Fn(usize) -> *const f32) -> Self::F {
+        unsafe { _mm256_loadu2_m128(place(1), place(0)) }
     }
     #[inline(always)]
-    unsafe fn transpose_halves([a, b, c, d]: [Self::F; 4]) -> [Self::F; 4] {
+    unsafe fn transpose_fours([a, b, c, d]: [Self::F; 4]) -> [Self::F; 4] {
         unsafe {
             let (ab_low, cd_low) = (_mm256_unpacklo_ps(a, b), _mm256_unpacklo_ps(c, d));
             let (ab_high, cd_high) = (_mm256_unpackhi_ps(a, b), _mm256_unpackhi_ps(c, d));
@@ -538,11 +534,31 @@ impl Groups for Avx2 {
         }
     }
     #[inline(always)]
-    unsafe fn load_halves_d(low: *const f64, high: *const f64) -> Self::D {
-        unsafe { [_mm256_loadu_pd(low), _mm256_loadu_pd(high)] }
+    unsafe fn prefix_sum_i(a: Self::I) -> Self::I {
+        unsafe {
+            let a = _mm256_add_epi32(a, _mm256_slli_si256::<4>(a));
+            let a = _mm256_add_epi32(a, _mm256_slli_si256::<8>(a));
+            // The low half's total, for the high half.
+            let totals = _mm256_shuffle_epi32::<0xff>(a);
+            _mm256_add_epi32(a, _mm256_permute2x128_si256::<0x08>(totals, totals))
+        }
     }
     #[inline(always)]
-    unsafe fn transpose_halves_d(rows: [Self::D; 4]) -> [Self::D; 4] {
+    unsafe fn last_i(a: Self::I) -> Self::I {
+        unsafe { _mm256_permutevar8x32_epi32(a, _mm256_set1_epi32(7)) }
+    }
+}
+
+impl Groups for Avx2 {
+    type Pair = Twice<Self>;
+    type Widest = Self;
+
+    #[inline(always)]
+    unsafe fn load_fours_d(place: impl Fn(usize) -> *const f64) -> Self::D {
+        unsafe { [_mm256_loadu_pd(place(0)), _mm256_loadu_pd(place(1))] }
+    }
+    #[inline(always)]
+    unsafe fn transpose_fours_d(rows: [Self::D; 4]) -> [Self::D; 4] {
         let [a, b, c, d] = rows;
         let mut columns = rows;
         for half in 0..2 {
@@ -558,20 +574,6 @@ impl Groups for Avx2 {
             }
         }
         columns
-    }
-    #[inline(always)]
-    unsafe fn prefix_sum_i(a: Self::I) -> Self::I {
-        unsafe {
-            let a = _mm256_add_epi32(a, _mm256_slli_si256::<4>(a));
-            let a = _mm256_add_epi32(a, _mm256_slli_si256::<8>(a));
-            // The low half's total, for the high half.
-            let totals = _mm256_shuffle_epi32::<0xff>(a);
-            _mm256_add_epi32(a, _mm256_permute2x128_si256::<0x08>(totals, totals))
-        }
-    }
-    #[inline(always)]
-    unsafe fn last_i(a: Self::I) -> Self::I {
-        unsafe { _mm256_permutevar8x32_epi32(a, _mm256_set1_epi32(7)) }
     }
     #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {

@@ -13,7 +13,7 @@ use crate::paper::{
     BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows, JITTER,
     MIDDLE, MISFIT, NEAR, NEAR_NOISE, PLACES, REACH, inverse_depth,
 };
-use crate::simd::{GROUP, Groups, Simd};
+use crate::simd::{Along, Groups, Simd};
 
 /// Finds the choices of the pixels of some rows of blocks, which are none so far.
 ///
@@ -40,7 +40,7 @@ pub(super) unsafe fn rows<S: Groups>(
             let group = Group { even, row, first: number * lanes, blocks };
             // SAFETY: as the caller's.
             unsafe {
-                group.candidates::<S::Widest, S>(&mut found)?;
+                group.candidates(&mut found)?;
                 found.weigh(even.asked.least_noise);
                 for (y, choices) in choices.chunks_mut(even.cloud.width).enumerate() {
                     for x in 0..BLOCK {
@@ -75,8 +75,8 @@ struct Lines<S: Simd> {
 struct Candidates<S: Simd> {
     /// The blocks whose windows they are.
     places: [u32; LANES],
-    /// Field by field, each of as many floats as there are lanes.
-    windows: [Lanes; FIELDS],
+    /// Their fields.
+    windows: [Floats<S>; FIELDS],
     /// The mask of the blocks that may take theirs.
     may_take: S::F,
     /// Where the windows' middles are, from the blocks' middle pixels.
@@ -150,7 +150,7 @@ impl<S: Simd> Candidates<S> {
         let zero = unsafe { Floats::splat(0.0) };
         Candidates {
             places: [0; LANES],
-            windows: [Lanes::ZERO; FIELDS],
+            windows: [zero; FIELDS],
             may_take: zero.0,
             middles: [zero; 2],
             radius: zero,
@@ -160,17 +160,6 @@ impl<S: Simd> Candidates<S> {
             jitter: zero,
             cost: zero,
         }
-    }
-
-    /// The fields of the windows.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    unsafe fn fields(&self) -> [Floats<S>; FIELDS] {
-        let from = self.windows.as_ptr().cast::<f32>();
-        // SAFETY: as the caller's; there is room for fields of `LANES`.
-        std::array::from_fn(|field| unsafe { Floats::load(from.add(field * S::LANES)) })
     }
 }
 
@@ -185,13 +174,13 @@ struct Found<S: Simd> {
     exact: S::F,
 }
 
-impl<S: Simd> Found<S> {
+impl<S: Along> Found<S> {
     /// Adds the windows of the blocks in these columns and rows, for the blocks of a mask.
     ///
     /// # Safety
-    /// The processor has the instruction set of `G`; the columns and rows are inside the image.
+    /// The processor has the instruction set of `S`; the columns and rows are inside the image.
     #[inline(always)]
-    unsafe fn add<G: Groups<Widest = S>>(
+    unsafe fn add(
         &mut self,
         windows: &[EvenWindow],
         columns: &Lines<S>,
@@ -214,21 +203,17 @@ impl<S: Simd> Found<S> {
         }
         to.may_take = may_take;
         to.middles = [columns.from_own, rows.from_own];
-        for group in (0..S::LANES).step_by(GROUP) {
-            let to = to.windows.as_mut_ptr().cast::<f32>().wrapping_add(group);
+        for first in [0, 4] {
             // SAFETY: as the caller's; a window is eight floats.
             unsafe {
-                let (mut front, mut back) = ([G::splat(0.0); 4], [G::splat(0.0); 4]);
+                let mut fields = [S::splat(0.0); 4];
                 for i in 0..4 {
-                    let at = |lane: usize| windows.add(place(group + lane)).cast::<f32>();
-                    let (low, high) = (at(i), at(i + 4));
-                    front[i] = G::load_halves(low, high);
-                    back[i] = G::load_halves(low.add(4), high.add(4));
+                    let at = |four: usize| windows.add(place(i + 4 * four)).cast::<f32>();
+                    fields[i] = S::load_fours(|four| at(four).add(first));
                 }
-                let (front, back) = (G::transpose_halves(front), G::transpose_halves(back));
+                let fields = S::transpose_fours(fields);
                 for i in 0..4 {
-                    G::store(to.add(i * S::LANES), front[i]);
-                    G::store(to.add((i + 4) * S::LANES), back[i]);
+                    to.windows[first + i] = Floats(fields[i]);
                 }
             }
         }
@@ -247,7 +232,7 @@ impl<S: Simd> Found<S> {
             let least_noise = Floats::<S>::splat(least_noise);
             let (mut least, mut there, mut exact) = (Floats::splat(f32::INFINITY), zero, zero);
             for to in &mut self.candidates[..self.number] {
-                let [radius, inverse_depth, across, down, _, noise, _, per_bend] = to.fields();
+                let [radius, inverse_depth, across, down, _, noise, _, per_bend] = to.windows;
                 let [dx, dy] = to.middles;
                 let is_near =
                     S::lt(dx.abs().max(dy.abs()).0, (radius + Floats::splat(REACH + 1.0)).0);
@@ -270,7 +255,7 @@ impl<S: Simd> Found<S> {
             self.exact = S::lt((Floats::splat(EXACT_SHARE) * there).0, exact.0);
             self.noise = least.max(least_noise);
             for to in &mut self.candidates[..self.number] {
-                let [_, _, _, _, unevenness, _, per_noise, _] = to.fields();
+                let [_, _, _, _, unevenness, _, per_noise, _] = to.windows;
                 let misfit = (unevenness - self.noise).max(zero);
                 let even = self.noise * per_noise + Floats::splat(MISFIT) * misfit * to.per_bend;
                 to.even = Floats(S::select(to.may_take, even.0, S::splat(f32::INFINITY)));
@@ -285,10 +270,7 @@ impl Group<'_> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn candidates<S: Simd, G: Groups<Widest = S>>(
-        &self,
-        found: &mut Found<S>,
-    ) -> Result<(), Error> {
+    unsafe fn candidates<S: Along>(&self, found: &mut Found<S>) -> Result<(), Error> {
         let &Group { even, row, blocks, .. } = self;
         let Blocks { across, down, .. } = even.asked.blocks;
         let &Cloud { width, height, .. } = even.cloud;
@@ -314,7 +296,7 @@ impl Group<'_> {
             let columns = Axis { pixels: width, blocks: across, number: 1 };
             let rows = Axis { pixels: height, blocks: down, number: across };
             let own = [columns.lines::<S>(column, column), rows.lines(row, row)];
-            found.add::<G>(even.windows, &own[0], &own[1], takes_any)?;
+            found.add(even.windows, &own[0], &own[1], takes_any)?;
             loop {
                 let may_take = S::and(S::lt(zero.0, radii.0), S::lt(S::splat(level), levels));
                 if S::bits(may_take) == 0 {
@@ -329,7 +311,7 @@ impl Group<'_> {
                 let across = [&left, &own[0], &right];
                 let down = [&above, &own[1], &below];
                 for (column, row) in PLACES {
-                    found.add::<G>(even.windows, across[column], down[row], may_take)?;
+                    found.add(even.windows, across[column], down[row], may_take)?;
                 }
                 radii = Floats(S::truncate((radii * Floats::splat(0.5)).0));
                 level += 1.0;

@@ -3,7 +3,7 @@
 use crate::cloud::Points;
 use crate::fast::lanes::LANES;
 use crate::options::{Depth, Options};
-use crate::simd::{GROUP, Groups};
+use crate::simd::Along;
 
 /// Elements of a row of depths: the width, and a pair of groups of NaN or more behind it.
 pub(crate) fn row_length(width: usize) -> usize {
@@ -15,7 +15,7 @@ pub(crate) fn row_length(width: usize) -> usize {
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-pub(crate) unsafe fn read<S: Groups>(
+pub(crate) unsafe fn read<S: Along>(
     points: &Points,
     options: &Options,
     y: usize,
@@ -26,11 +26,11 @@ pub(crate) unsafe fn read<S: Groups>(
     let range = options.paper.depth == Depth::Range;
     let depths = &mut depths[..row_length(width)];
     let points = points.row(y, 0..width, whole_points);
-    // SAFETY: as the caller's; the groups lie inside the depths.
+    // SAFETY: as the caller's; all lanes lie inside the depths.
     unsafe {
         let none = S::splat(f32::NAN);
         let zero = S::splat(0.0);
-        for x in (0..width).step_by(GROUP) {
+        for x in (0..width).step_by(S::LANES) {
             let [px, py, pz] = points.group::<S>(x);
             let mut there = S::and(S::and(S::finite(px), S::finite(py)), S::finite(pz));
             if options.zero_is_missing {

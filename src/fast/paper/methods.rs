@@ -177,14 +177,13 @@ pub(crate) unsafe fn gather<S: Groups>(
 ) -> [Floats<S>; 4] {
     debug_assert!(places.iter().all(|at| (*at as usize) < points.len()));
     let points = points.as_ptr();
-    // SAFETY: as the caller's; a point is half a group.
+    // SAFETY: as the caller's; a point is four floats.
     unsafe {
         let mut rows = [S::splat(0.0); 4];
         for i in 0..4 {
-            let (low, high) = (points.add(places[i] as usize), points.add(places[i + 4] as usize));
-            rows[i] = S::load_halves(low.cast(), high.cast());
+            rows[i] = S::load_fours(|four| points.add(places[i + 4 * four] as usize).cast());
         }
-        let [x, y, z, count] = S::transpose_halves(rows);
+        let [x, y, z, count] = S::transpose_fours(rows);
         [Floats(x), Floats(y), Floats(z), Floats(count)]
     }
 }

@@ -368,7 +368,7 @@ impl Task for DepthsTask<'_> {
     unsafe fn run<S: Groups>(self) {
         let DepthsTask { points, options, y, whole_points, depths } = self;
         // SAFETY: as the caller's.
-        unsafe { depths::read::<S>(points, options, y, whole_points, depths) };
+        unsafe { depths::read::<S::Widest>(points, options, y, whole_points, depths) };
     }
 }
 

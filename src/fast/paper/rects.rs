@@ -108,15 +108,15 @@ impl Rects {
             let mut channels = [Doubles::splat(0.0); N];
             for first in (0..N).step_by(4) {
                 let at = |corner: &Indices, lane: usize| {
-                    let four = |lane: usize| sums.add(corner[lane] as usize + first);
-                    Doubles::<S>(S::load_halves_d(four(lane), four(lane + 4)))
+                    let four = |i: usize| sums.add(corner[lane + 4 * i] as usize + first);
+                    Doubles::<S>(S::load_fours_d(four))
                 };
                 let [a, b, c, d] = &self.corners;
                 let mut windows = [S::splat_d(0.0); 4];
                 for i in 0..4 {
                     windows[i] = ((at(d, i) - at(c, i)) - (at(b, i) - at(a, i))).0;
                 }
-                let fours = S::transpose_halves_d(windows);
+                let fours = S::transpose_fours_d(windows);
                 for i in 0..4 {
                     channels[first + i] = Doubles(fours[i]);
                 }
