@@ -450,9 +450,8 @@ unsafe fn forward<S: Simd>(order: LaneOrder, above: &[Lanes], row: &mut [Lanes])
             row[at].store::<S>(left);
         }
     }
-    for lane in 1..LANES {
-        carry(row[segment].0[lane - 1], row[1..=segment].iter_mut(), lane);
-    }
+    // SAFETY: as the caller's.
+    unsafe { carry::<S>(row, 1..=segment, |row| row[segment].next_lane(f32::INFINITY)) };
     // The last column's upper right neighbour is column 0 of this row.
     wrap(order, row, order.width - 1, 0);
 }
@@ -481,23 +480,42 @@ unsafe fn backward<S: Simd>(order: LaneOrder, row: &mut [Lanes], below: &[Lanes]
             row[at].store::<S>(right);
         }
     }
-    for lane in (0..last_lane).rev() {
-        carry(row[1].0[lane + 1], row[1..=segment].iter_mut().rev(), lane);
-    }
+    let ends = |row: &[Lanes]| {
+        let mut ends = row[1].previous_lane(f32::INFINITY);
+        ends.0[last_lane..].fill(f32::INFINITY);
+        ends
+    };
+    // SAFETY: as the caller's.
+    unsafe { carry::<S>(row, (1..=segment).rev(), ends) };
     // Column 0's lower left neighbour is the last column of this row.
     wrap(order, row, 0, order.width - 1);
 }
 
-/// Goes on with the step along the row from the end of one segment through the next, as far as it is nearer.
+/// Goes on with the step along the row from the ends of segments, each of which is in the lane of the next one, through
+/// these, as far as it is nearer.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
 #[inline(always)]
-fn carry<'a>(end: f32, segment: impl Iterator<Item = &'a mut Lanes>, lane: usize) {
-    let mut value = end + STRAIGHT;
-    for element in segment {
-        if value >= element.0[lane] {
-            break;
+unsafe fn carry<S: Simd>(
+    row: &mut [Lanes],
+    segment: impl Iterator<Item = usize> + Clone,
+    ends: impl Fn(&[Lanes]) -> Lanes,
+) {
+    // SAFETY: as the caller's.
+    unsafe {
+        loop {
+            let mut value = ends(row).load::<S>();
+            for at in segment.clone() {
+                value = S::add(value, S::splat(STRAIGHT));
+                let own = row[at].load::<S>();
+                if S::bits(S::lt(value, own)) == 0 {
+                    return;
+                }
+                row[at].store::<S>(S::min(value, own));
+            }
+            // Some segment's own end is nearer now.
         }
-        element.0[lane] = value;
-        value += STRAIGHT;
     }
 }
 
