@@ -512,6 +512,7 @@ unsafe fn carry<S: Simd>(
                 if S::bits(S::lt(value, own)) == 0 {
                     return;
                 }
+                // Where it is no nearer, it is not farther along either: neighbours are at most a step apart.
                 row[at].store::<S>(S::min(value, own));
             }
             // Some segment's own end is nearer now.
