@@ -324,7 +324,7 @@ impl PointRow<'_> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn group<S: Along>(&self, at: usize) -> [S::F; 3] {
+    pub unsafe fn lanes<S: Along>(&self, at: usize) -> [S::F; 3] {
         prefetch(self.first.wrapping_byte_add(self.below + at * self.step), S::LANES * self.step);
         // SAFETY: as the caller's; the points are inside the row, and of those that are read whole none is its last.
         unsafe {
@@ -342,7 +342,7 @@ impl PointRow<'_> {
         }
     }
 
-    /// [`PointRow::group`], coordinate by coordinate.
+    /// [`PointRow::lanes`], coordinate by coordinate.
     fn gather(&self, at: usize, lanes: usize) -> [[f32; 2 * GROUP]; 3] {
         let mut planes = [[f32::NAN; 2 * GROUP]; 3];
         for (lane, x) in self.columns.clone().skip(at).take(lanes).enumerate() {

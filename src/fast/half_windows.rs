@@ -97,7 +97,7 @@ impl Sums for HalfWindows {
     #[inline(always)]
     unsafe fn push<S: Groups>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
         let place = frame.place(y);
-        let groups = frame.along::<S>();
+        let groups = frame.steps::<S>();
         assert!(MARGIN + groups * GROUP <= frame.stride);
         assert!(frame.start_of(1, frame.ring + 1) <= self.integrals.len());
         let z = planes.row(frame, 2, y).as_ptr();

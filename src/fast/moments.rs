@@ -114,7 +114,7 @@ impl Sums for Moments {
     #[inline(always)]
     unsafe fn push<S: Groups>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
         let place = frame.place(y);
-        let groups = frame.along::<S>();
+        let groups = frame.steps::<S>();
         let (stride, plane) = (frame.stride, 3 * frame.stride);
         assert!(MARGIN + groups * GROUP <= stride && plane <= self.centered.len());
         assert!(frame.start_of(CHANNELS, frame.ring + 1) <= self.integrals.len());

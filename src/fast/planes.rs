@@ -55,8 +55,8 @@ impl Frame {
         Frame::new(0..(GROUP + columns + side + 2).min(width), 0..0, side)
     }
 
-    /// How often lanes cover the columns and a group behind them.
-    pub fn along<S: Simd>(&self) -> usize {
+    /// Steps of so many lanes that go over the columns and a group behind them.
+    pub fn steps<S: Simd>(&self) -> usize {
         (self.columns.len().next_multiple_of(GROUP) + GROUP).div_ceil(S::LANES)
     }
 
@@ -194,7 +194,7 @@ impl Planes {
     ) -> RowNews {
         let start = frame.start(3, y);
         let row = &mut self.data[start..start + 3 * frame.stride];
-        assert!(MARGIN + frame.along::<S>() * S::LANES <= frame.stride);
+        assert!(MARGIN + frame.steps::<S>() * S::LANES <= frame.stride);
         let points = points.row(y, frame.columns.clone(), whole_points);
         let xs = row[MARGIN..].as_mut_ptr();
         // SAFETY: as the caller's; all lanes, and a group behind the columns, lie inside the planes.
@@ -202,9 +202,9 @@ impl Planes {
             let (ys, zs) = (xs.add(frame.stride), xs.add(2 * frame.stride));
             let mut hidden = S::splat(0.0);
             let mut largest = S::splat(0.0);
-            for number in 0..frame.along::<S>() {
-                let at = number * S::LANES;
-                let [x, y, z] = points.group::<S>(at);
+            for step in 0..frame.steps::<S>() {
+                let at = step * S::LANES;
+                let [x, y, z] = points.lanes::<S>(at);
                 let finite_z = S::finite(z);
                 let finite = S::and(finite_z, S::and(S::finite(x), S::finite(y)));
                 hidden = S::or(hidden, S::and_not(finite, finite_z));

@@ -54,7 +54,7 @@ impl<const SIMPLE: bool> Strips<SIMPLE> {
     #[inline(always)]
     unsafe fn push_row<S: Along>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
         std::mem::swap(&mut self.last, &mut self.above);
-        let count = frame.along::<S>();
+        let steps = frame.steps::<S>();
         for c in 0..3 {
             let start = c * frame.stride;
             let own = frame.start(3, y) + start;
@@ -64,15 +64,15 @@ impl<const SIMPLE: bool> Strips<SIMPLE> {
             let pair = &self.above[start..start + frame.stride];
             let rows = &mut self.rows[own..own + frame.stride];
             assert!(
-                MARGIN + count * S::LANES <= frame.stride
+                MARGIN + steps * S::LANES <= frame.stride
                     && own.max(above) + frame.stride <= self.columns.len()
             );
             // SAFETY: as the caller's; the groups lie inside the rows, whose lengths were just checked.
             unsafe {
                 let (origin, scale) = (S::splat(self.origin[c]), S::splat(self.scale));
                 let mut carry = S::splat_i(0);
-                for number in 0..count {
-                    let at = MARGIN + number * S::LANES;
+                for step in 0..steps {
+                    let at = MARGIN + step * S::LANES;
                     let point = S::sub(S::load(from.add(at)), origin);
                     let point = S::round_i(S::mul(point, scale));
                     S::store_i(last.as_mut_ptr().add(at), point);
@@ -85,8 +85,8 @@ impl<const SIMPLE: bool> Strips<SIMPLE> {
                     S::store_i(rows.as_mut_ptr().add(at), sum);
                 }
                 let columns = self.columns.as_mut_ptr();
-                for number in 0..count {
-                    let at = MARGIN + number * S::LANES;
+                for step in 0..steps {
+                    let at = MARGIN + step * S::LANES;
                     let mut strip = S::load_i(last.as_ptr().add(at));
                     if !SIMPLE {
                         strip = S::add_i(strip, S::load_i(last.as_ptr().add(at - 1)));

@@ -31,7 +31,7 @@ pub(crate) unsafe fn read<S: Along>(
         let none = S::splat(f32::NAN);
         let zero = S::splat(0.0);
         for x in (0..width).step_by(S::LANES) {
-            let [px, py, pz] = points.group::<S>(x);
+            let [px, py, pz] = points.lanes::<S>(x);
             let mut there = S::and(S::and(S::finite(px), S::finite(py)), S::finite(pz));
             if options.zero_is_missing {
                 let origin = S::and(S::and(S::eq(px, zero), S::eq(py, zero)), S::eq(pz, zero));

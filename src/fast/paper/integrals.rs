@@ -131,7 +131,7 @@ impl<const N: usize> Rings<N> {
             for x in (0..length).step_by(GROUP) {
                 let depths = S::load(depths.as_ptr().add(self.columns.start + x));
                 let there = S::eq(depths, depths);
-                let point = points.group::<S>(x);
+                let point = points.lanes::<S>(x);
                 let mut fields = [[0.0; GROUP]; 4];
                 for c in 0..3 {
                     let field = S::and(there, point[c]);
