@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::arithmetic::Doubles;
 use super::buffer::{Buffer, Number};
+use super::lanes::LANES;
 use crate::Error;
 use crate::cloud::Points;
 use crate::simd::{Along, GROUP, Simd};
@@ -26,7 +27,7 @@ pub(crate) struct Frame {
 
 impl Frame {
     fn new(columns: Range<usize>, rows: Range<usize>, side: usize) -> Self {
-        let stride = (columns.len() + 2 * MARGIN).next_multiple_of(2 * GROUP) + MARGIN;
+        let stride = (columns.len() + 2 * MARGIN).next_multiple_of(LANES) + MARGIN;
         Frame { columns, stride, ring: Self::ring(side), rows }
     }
 
@@ -216,7 +217,7 @@ impl Planes {
                 S::store(ys.add(at), y);
                 S::store(zs.add(at), z);
             }
-            let mut lanes = [0.0; 2 * GROUP];
+            let mut lanes = [0.0; LANES];
             S::store(lanes.as_mut_ptr(), largest);
             RowNews { hidden: S::bits(hidden) != 0, largest: lanes.into_iter().fold(0.0, f32::max) }
         }

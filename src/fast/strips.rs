@@ -67,7 +67,7 @@ impl<const SIMPLE: bool> Strips<SIMPLE> {
                 MARGIN + steps * S::LANES <= frame.stride
                     && own.max(above) + frame.stride <= self.columns.len()
             );
-            // SAFETY: as the caller's; the groups lie inside the rows, whose lengths were just checked.
+            // SAFETY: as the caller's; all lanes lie inside the rows, whose lengths were just checked.
             unsafe {
                 let (origin, scale) = (S::splat(self.origin[c]), S::splat(self.scale));
                 let mut carry = S::splat_i(0);

@@ -123,7 +123,7 @@ pub(crate) trait Simd: Copy {
     }
 }
 
-/// As many lanes as a register of floats has, but no fewer than a group: what goes along a row.
+/// Lanes that pixels of a row side by side are in, and what goes along the row.
 ///
 /// # Safety
 /// As [`Simd`].

@@ -208,8 +208,8 @@ impl<S: Along> Found<S> {
             unsafe {
                 let mut fields = [S::splat(0.0); 4];
                 for i in 0..4 {
-                    let at = |four: usize| windows.add(place(i + 4 * four)).cast::<f32>();
-                    fields[i] = S::load_fours(|four| at(four).add(first));
+                    let at = |four: usize| windows.add(to.places[i + 4 * four] as usize);
+                    fields[i] = S::load_fours(|four| at(four).cast::<f32>().add(first));
                 }
                 let fields = S::transpose_fours(fields);
                 for i in 0..4 {
