@@ -2,9 +2,10 @@
 
 use super::arithmetic::{Doubles, Floats, cross, dot};
 use super::buffer::Buffer;
+use super::by_side::{self, BySide};
 use super::planes::{Corners, Frame, MARGIN, Planes, sum_between};
 use super::run::OfRun;
-use super::tile::{Found, Sums};
+use super::tile::{Found, Pair, Sums, Tile};
 use crate::Error;
 use crate::memory::{bytes, make_room};
 use crate::paper::ROUNDING;
@@ -68,14 +69,11 @@ impl Places {
 }
 
 impl Sums for HalfWindows {
-    type OfLanes<S: Simd> = Tangents<Floats<S>>;
-    type Of1 = Tangents<f32>;
     type OfRun = OfRun<f32, 6>;
 
     const COLUMN: usize = size_of::<f64>();
     const CURVATURE: bool = false;
     const LIMITED: bool = false;
-    const PAIRS: bool = true;
 
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {
         frame.reserve_ring(1, &mut self.integrals)?;
@@ -121,6 +119,66 @@ impl Sums for HalfWindows {
         self.places.clear();
         self.places.extend((0..=side).map(|side| Places::of(frame, y, side)));
     }
+
+    #[inline(always)]
+    unsafe fn note<S: Groups>(
+        &self,
+        tile: &Tile,
+        frame: &Frame,
+        planes: &Planes,
+        pair: &Pair,
+        run: &mut Self::OfRun,
+        at: usize,
+    ) -> u32 {
+        // SAFETY: as the caller's.
+        unsafe { by_side::note::<S, Self>(self, tile, frame, planes, pair, run, at) }
+    }
+
+    #[inline(always)]
+    unsafe fn estimate<S: Simd>(
+        &self,
+        run: &OfRun<f32, 6>,
+        at: usize,
+        sides: S::F,
+        _fresh: bool,
+    ) -> Found<S> {
+        // SAFETY: as the caller's.
+        unsafe {
+            let [hx, hy, hz, vx, vy, vz] = run.load::<S>(at);
+            let (h, v) = ([hx, hy, hz], [vx, vy, vz]);
+            let n = cross(h, v);
+            let n2 = dot(n, n);
+            let (h2, v2) = (dot(h, h), dot(v, v));
+            let sine = h2 * v2 * Floats::splat(DOUBT_SINE);
+            let doubt = Floats::splat(self.doubt);
+            let half = Floats::<S>(S::truncate(S::mul(sides, S::splat(0.5))));
+            let points = half * half;
+            let exact = (doubt * (h2 + v2)).lt(n2 * points * points);
+            let exact_ends = doubt.lt(h2) & doubt.lt(v2);
+            // Below this, squares of floats lose digits.
+            let least = Floats::splat(f32::MIN_POSITIVE / f32::EPSILON);
+            // In windows of 3 both tangents join the same two points: floats decide the direction, as in PCL.
+            let smallest = Floats::<S>(sides).lt(Floats::splat(4.0));
+            // And where they say that the tangents are parallel, there is no normal: n / |n| is NaN then.
+            let zero = Floats::splat(0.0);
+            let parallel = !(zero.lt(n[0].abs().max(n[1].abs()).max(n[2].abs())));
+            let floats_decide = least.lt(n2) | parallel & least.lt(h2) & least.lt(v2);
+            let floats_decide = smallest & exact_ends & floats_decide;
+            let scale = Floats::splat(1.0) / n2.sqrt();
+            Found {
+                normal: [n[0] * scale, n[1] * scale, n[2] * scale],
+                curvature: Floats::splat(f32::NAN),
+                doubtful: !(exact & sine.max(least).lt(n2) | floats_decide),
+            }
+        }
+    }
+}
+
+impl BySide for HalfWindows {
+    type OfLanes<S: Simd> = Tangents<Floats<S>>;
+    type Of1 = Tangents<f32>;
+
+    const PAIRS: bool = true;
 
     #[inline(always)]
     unsafe fn of_pixels<S: Simd>(
@@ -233,48 +291,13 @@ impl Sums for HalfWindows {
     }
 
     #[inline(always)]
-    unsafe fn note<S: Simd>(tangents: Tangents<Floats<S>>, run: &mut OfRun<f32, 6>, at: usize) {
+    unsafe fn note_lanes<S: Simd>(
+        tangents: Tangents<Floats<S>>,
+        run: &mut OfRun<f32, 6>,
+        at: usize,
+    ) {
         let [[a, b, c], [d, e, f]] = tangents;
         // SAFETY: as the caller's.
         unsafe { run.store::<S>(at, [a, b, c, d, e, f]) }
-    }
-
-    #[inline(always)]
-    unsafe fn estimate<S: Simd>(
-        &self,
-        run: &OfRun<f32, 6>,
-        at: usize,
-        sides: S::F,
-        _fresh: bool,
-    ) -> Found<S> {
-        // SAFETY: as the caller's.
-        unsafe {
-            let [hx, hy, hz, vx, vy, vz] = run.load::<S>(at);
-            let (h, v) = ([hx, hy, hz], [vx, vy, vz]);
-            let n = cross(h, v);
-            let n2 = dot(n, n);
-            let (h2, v2) = (dot(h, h), dot(v, v));
-            let sine = h2 * v2 * Floats::splat(DOUBT_SINE);
-            let doubt = Floats::splat(self.doubt);
-            let half = Floats::<S>(S::truncate(S::mul(sides, S::splat(0.5))));
-            let points = half * half;
-            let exact = (doubt * (h2 + v2)).lt(n2 * points * points);
-            let exact_ends = doubt.lt(h2) & doubt.lt(v2);
-            // Below this, squares of floats lose digits.
-            let least = Floats::splat(f32::MIN_POSITIVE / f32::EPSILON);
-            // In windows of 3 both tangents join the same two points: floats decide the direction, as in PCL.
-            let smallest = Floats::<S>(sides).lt(Floats::splat(4.0));
-            // And where they say that the tangents are parallel, there is no normal: n / |n| is NaN then.
-            let zero = Floats::splat(0.0);
-            let parallel = !(zero.lt(n[0].abs().max(n[1].abs()).max(n[2].abs())));
-            let floats_decide = least.lt(n2) | parallel & least.lt(h2) & least.lt(v2);
-            let floats_decide = smallest & exact_ends & floats_decide;
-            let scale = Floats::splat(1.0) / n2.sqrt();
-            Found {
-                normal: [n[0] * scale, n[1] * scale, n[2] * scale],
-                curvature: Floats::splat(f32::NAN),
-                doubtful: !(exact & sine.max(least).lt(n2) | floats_decide),
-            }
-        }
     }
 }

@@ -1,11 +1,13 @@
 //! The fast form of the whole method: the same steps as the plain form, over lanes, rows and tiles.
 //!
 //! First the windows of the whole image (`windows`), then tile by tile the points (`planes`), the method's rings of
-//! sums (`strips`, `moments`, `half_windows`) and, run by run (`run`), the normals (`tile`). Tiles are fixed by the
+//! sums (`strip_pairs`, `strips`, `moments`, `half_windows`) and, run by run (`run`), the normals (`tile`). Tiles are fixed by the
 //! frame and the options, so that results do not depend on the number of threads.
 
 mod arithmetic;
 mod buffer;
+mod by_side;
+mod gradients;
 mod half_windows;
 mod lanes;
 mod moments;
@@ -14,6 +16,7 @@ mod paths;
 mod planes;
 mod run;
 mod sink;
+mod strip_pairs;
 mod strips;
 mod tile;
 mod windows;
@@ -29,6 +32,7 @@ use moments::Moments;
 use paths::Task;
 use planes::{Frame, Planes};
 use sink::Sink;
+use strip_pairs::StripPairs;
 use strips::Strips;
 use tile::{Sums, Tile};
 use windows::{Sweep, WindowRows, row_length, sides};
@@ -77,8 +81,8 @@ struct WorkerScratch {
     frame: Frame,
     planes: Planes,
     moments: Moments,
-    strips: Strips<false>,
-    simple_strips: Strips<true>,
+    strip_pairs: StripPairs,
+    strips: Strips,
     half_windows: HalfWindows,
     paper: paper::WorkerScratch,
 }
@@ -109,9 +113,9 @@ impl WorkerScratch {
         self.planes.reserve(frame)?;
         match method {
             Method::CovarianceMatrix => self.moments.reserve(frame, side),
-            Method::Average3DGradient => self.strips.reserve(frame, side),
+            Method::Average3DGradient => self.strip_pairs.reserve(frame, side),
             Method::AverageDepthChange => self.half_windows.reserve(frame, side),
-            Method::Simple3DGradient => self.simple_strips.reserve(frame, side),
+            Method::Simple3DGradient => self.strips.reserve(frame, side),
         }
     }
 
@@ -119,8 +123,8 @@ impl WorkerScratch {
         self.sweep.size()
             + self.planes.size()
             + self.moments.size()
+            + self.strip_pairs.size()
             + self.strips.size()
-            + self.simple_strips.size()
             + self.half_windows.size()
             + self.paper.size()
     }
@@ -143,6 +147,23 @@ impl Chunk {
     /// Which of the map's rows an own row of the chunk is.
     fn place(&self, y: usize) -> usize {
         self.start + y - self.swept.start
+    }
+}
+
+/// The sides of all pixels' windows, 0 for none.
+#[derive(Clone, Copy)]
+struct Sides<'a> {
+    /// The rows that the chunks' sweeps have filled.
+    rows: &'a [Lanes],
+    width: usize,
+    chunks: &'a [Chunk],
+}
+
+impl<'a> Sides<'a> {
+    /// Those of row `y`, readable up to a whole pair of groups.
+    fn row(&self, y: usize) -> &'a [f32] {
+        let chunk = &self.chunks[y / self.chunks[0].own.len()];
+        sides(self.rows, self.width, chunk.place(y))
     }
 }
 
@@ -207,15 +228,14 @@ pub(crate) fn compute(
 
     let reach = job.reach(deepest);
     let rows = &rows[..swept * length];
-    let per_chunk = chunks[0].own.len();
-    let sides = |y: usize| sides(rows, width, chunks[y / per_chunk].place(y));
+    let sides = Sides { rows, width, chunks };
     let sink = Sink::new(normals, indices, width, listed)?;
     let side = (side as usize).min(width.min(height));
     let frame = Frame::largest(job.columns(reach), side, width);
     for scratch in &each[..count] {
         lock(scratch).reserve(options.method, &frame, side)?;
     }
-    job.tiles(workers, each, reach, deepest, &sides, &sink);
+    job.tiles(workers, each, reach, deepest, sides, &sink);
     Ok(())
 }
 
@@ -305,13 +325,13 @@ impl Job<'_> {
 
     /// Steps 4 and 5, all tiles.
     #[inline(never)]
-    fn tiles<'r>(
+    fn tiles(
         &self,
         workers: &Workers,
         each: &[Mutex<WorkerScratch>],
         reach: usize,
         deepest: f32,
-        sides: &(impl Fn(usize) -> &'r [f32] + Sync),
+        sides: Sides,
         sink: &Sink,
     ) {
         let Image { width, height, .. } = self.image;
@@ -329,9 +349,10 @@ impl Job<'_> {
                 rows: row..(row + rows).min(height),
                 deepest,
                 whole_points: self.whole_points,
+                sides,
             };
             let scratch = &mut lock(&each[worker]);
-            let task = TileTask { tile: &tile, scratch, sides, sink };
+            let task = TileTask { tile: &tile, scratch, sink };
             // SAFETY: the processor has the instruction set of the job, and tiles do not share pixels.
             unsafe { paths::run(self.isa, task) };
         });
@@ -342,9 +363,9 @@ impl Job<'_> {
         let column = 3 * size_of::<f32>()
             + match self.options.method {
                 Method::CovarianceMatrix => Moments::COLUMN,
-                Method::Average3DGradient => Strips::<false>::COLUMN,
+                Method::Average3DGradient => StripPairs::COLUMN,
                 Method::AverageDepthChange => HalfWindows::COLUMN,
-                Method::Simple3DGradient => Strips::<true>::COLUMN,
+                Method::Simple3DGradient => Strips::COLUMN,
             };
         let bytes = column * Frame::ring(reach);
         let columns = (TILE_BYTES / bytes).max(2 * reach).next_multiple_of(LANES);
@@ -381,36 +402,29 @@ impl Task for SweepTask<'_> {
 }
 
 /// One tile, with the sums of its method; no one else writes the tile's pixels.
-struct TileTask<'a, F> {
+struct TileTask<'a> {
     tile: &'a Tile<'a>,
     scratch: &'a mut WorkerScratch,
-    sides: &'a F,
     sink: &'a Sink<'a>,
 }
 
-impl<'r, F: Fn(usize) -> &'r [f32]> Task for TileTask<'_, F> {
+impl Task for TileTask<'_> {
     type Output = ();
 
     #[inline(always)]
     unsafe fn run<S: Groups>(self) {
-        let TileTask { tile, scratch, sides, sink } = self;
-        let WorkerScratch { frame, planes, moments, strips, simple_strips, half_windows, .. } =
+        let TileTask { tile, scratch, sink } = self;
+        let WorkerScratch { frame, planes, moments, strip_pairs, strips, half_windows, .. } =
             scratch;
         // SAFETY: as the caller's.
         unsafe {
             match tile.options.method {
-                Method::CovarianceMatrix => {
-                    tile.compute::<S, _>(frame, planes, moments, sides, sink)
-                }
-                Method::Average3DGradient => {
-                    tile.compute::<S, _>(frame, planes, strips, sides, sink)
-                }
+                Method::CovarianceMatrix => tile.compute::<S, _>(frame, planes, moments, sink),
+                Method::Average3DGradient => tile.compute::<S, _>(frame, planes, strip_pairs, sink),
                 Method::AverageDepthChange => {
-                    tile.compute::<S, _>(frame, planes, half_windows, sides, sink)
+                    tile.compute::<S, _>(frame, planes, half_windows, sink)
                 }
-                Method::Simple3DGradient => {
-                    tile.compute::<S, _>(frame, planes, simple_strips, sides, sink)
-                }
+                Method::Simple3DGradient => tile.compute::<S, _>(frame, planes, strips, sink),
             }
         }
     }

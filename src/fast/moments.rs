@@ -3,10 +3,11 @@
 
 use super::arithmetic::{Doubles, Floats, dot};
 use super::buffer::Buffer;
+use super::by_side::{self, BySide};
 use super::lanes::LANES;
 use super::planes::{Corners, Frame, MARGIN, Planes, sum_between};
 use super::run::{Noted, OfRun, RUN};
-use super::tile::{Bits, Found, Sums};
+use super::tile::{Bits, Found, Pair, Sums, Tile};
 use crate::Error;
 use crate::cloud::Points;
 use crate::memory::{bytes, make_room};
@@ -87,14 +88,11 @@ const DOUBT_SUMS: f64 = 3e4;
 const DOUBT_PLANE: f32 = 1e-5;
 
 impl Sums for Moments {
-    type OfLanes<S: Simd> = WindowMoments<Doubles<S>>;
-    type Of1 = WindowMoments<f64>;
     type OfRun = Matrices;
 
     const COLUMN: usize = CHANNELS * size_of::<f64>();
     const CURVATURE: bool = true;
     const LIMITED: bool = false;
-    const PAIRS: bool = false;
 
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {
         frame.reserve_ring(CHANNELS, &mut self.integrals)?;
@@ -153,6 +151,60 @@ impl Sums for Moments {
         self.places.clear();
         self.places.extend((0..=side).map(place));
     }
+
+    #[inline(always)]
+    unsafe fn note<S: Groups>(
+        &self,
+        tile: &Tile,
+        frame: &Frame,
+        planes: &Planes,
+        pair: &Pair,
+        run: &mut Self::OfRun,
+        at: usize,
+    ) -> u32 {
+        // SAFETY: as the caller's.
+        unsafe { by_side::note::<S, Self>(self, tile, frame, planes, pair, run, at) }
+    }
+
+    #[inline(always)]
+    unsafe fn afresh<S: Groups>(
+        points: &Points,
+        image: &Image,
+        windows: impl Fn(usize) -> ((usize, usize), usize),
+        lanes: u32,
+        run: &mut Matrices,
+        at: usize,
+    ) -> bool {
+        let sum_up = |lane: usize| {
+            let ((x, y), side) = windows(lane);
+            let half = (side / 2) as isize;
+            let window = (x as isize - half, y as isize - half);
+            let pixels = image.rects(window, (side, side)).flat_map(|rect| rect.pixels());
+            sum_of_moments(pixels.map(|(x, y)| points.at(x, y).map(f64::from)))
+        };
+        // SAFETY: as the caller's.
+        unsafe { run.note_afresh::<S>(at, lanes, sum_up) };
+        true
+    }
+
+    #[inline(always)]
+    unsafe fn estimate<S: Simd>(
+        &self,
+        run: &Matrices,
+        at: usize,
+        _sides: S::F,
+        fresh: bool,
+    ) -> Found<S> {
+        // SAFETY: as the caller's.
+        unsafe { run.normals(at, if fresh { 0.0 } else { self.error }) }
+    }
+}
+
+impl BySide for Moments {
+    type OfLanes<S: Simd> = WindowMoments<Doubles<S>>;
+    type Of1 = WindowMoments<f64>;
+
+    const PAIRS: bool = false;
 
     #[inline(always)]
     unsafe fn of_pixels<S: Simd>(
@@ -243,42 +295,13 @@ impl Sums for Moments {
     }
 
     #[inline(always)]
-    unsafe fn afresh<S: Groups>(
-        points: &Points,
-        image: &Image,
-        windows: impl Fn(usize) -> ((usize, usize), usize),
-        lanes: u32,
+    unsafe fn note_lanes<S: Simd>(
+        moments: WindowMoments<Doubles<S>>,
         run: &mut Matrices,
         at: usize,
-    ) -> bool {
-        let sum_up = |lane: usize| {
-            let ((x, y), side) = windows(lane);
-            let half = (side / 2) as isize;
-            let window = (x as isize - half, y as isize - half);
-            let pixels = image.rects(window, (side, side)).flat_map(|rect| rect.pixels());
-            sum_of_moments(pixels.map(|(x, y)| points.at(x, y).map(f64::from)))
-        };
-        // SAFETY: as the caller's.
-        unsafe { run.note_afresh::<S>(at, lanes, sum_up) };
-        true
-    }
-
-    #[inline(always)]
-    unsafe fn note<S: Simd>(moments: WindowMoments<Doubles<S>>, run: &mut Matrices, at: usize) {
+    ) {
         // SAFETY: as the caller's.
         unsafe { run.note(&moments, at) }
-    }
-
-    #[inline(always)]
-    unsafe fn estimate<S: Simd>(
-        &self,
-        run: &Matrices,
-        at: usize,
-        _sides: S::F,
-        fresh: bool,
-    ) -> Found<S> {
-        // SAFETY: as the caller's.
-        unsafe { run.normals(at, if fresh { 0.0 } else { self.error }) }
     }
 }
 

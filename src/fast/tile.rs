@@ -3,6 +3,7 @@
 
 use std::ops::{Range, RangeInclusive};
 
+use super::Sides;
 use super::arithmetic::{Floats, dot};
 use super::lanes::LANES;
 use super::planes::{Frame, MARGIN, Planes};
@@ -41,10 +42,6 @@ impl<S: Simd> Found<S> {
 
 /// A method's sums over windows, from rings of integral rows. Each method says what it keeps a ring of.
 pub(crate) trait Sums {
-    /// The sums of as many windows as there are lanes.
-    type OfLanes<S: Simd>: Copy;
-    /// The sums of one window.
-    type Of1;
     /// What the normals of a run of pixels are made from.
     type OfRun: Noted;
 
@@ -56,9 +53,6 @@ pub(crate) trait Sums {
 
     /// Whether sums go wrong where a coordinate is beyond the limit: the camera is the origin where that will do.
     const LIMITED: bool;
-
-    /// Whether pairs of groups are summed as such: not where a group's sums fill the registers.
-    const PAIRS: bool;
 
     /// Makes room for frames that are no larger, and windows of up to `side`.
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error>;
@@ -80,51 +74,20 @@ pub(crate) trait Sums {
     /// for the same ones again and again.
     fn aim(&mut self, frame: &Frame, y: usize, side: usize);
 
-    /// The sums of the windows of `side` x `side` around the pixels from `x` on, one in each lane, of the row aimed
-    /// at. The windows, and the pixels around them, lie inside the image and hold finite points only.
+    /// Notes the sums of the windows of a pair of groups of the row aimed at, which is `at` in its run; returns the
+    /// lanes whose windows are left to the plain form.
     ///
     /// # Safety
     /// As [`Sums::push`]; the rings hold the rows and columns of the windows.
-    unsafe fn of_pixels<S: Simd>(
+    unsafe fn note<S: Groups>(
         &self,
+        tile: &Tile,
         frame: &Frame,
         planes: &Planes,
-        x: usize,
-        side: usize,
-    ) -> Self::OfLanes<S>;
-
-    /// `mask ? yes : no`
-    ///
-    /// # Safety
-    /// As [`Sums::push`].
-    unsafe fn select<S: Simd>(
-        lanes: u32,
-        yes: Self::OfLanes<S>,
-        no: Self::OfLanes<S>,
-    ) -> Self::OfLanes<S>;
-
-    /// The sums of one window that crosses the border of the image and is mirrored there; none if this method
-    /// leaves such windows to the plain form.
-    fn of_mirrored(
-        &self,
-        frame: &Frame,
-        planes: &Planes,
-        image: &Image,
-        pixel: (usize, usize),
-        side: usize,
-    ) -> Option<Self::Of1>;
-
-    /// Sums to put lanes into.
-    ///
-    /// # Safety
-    /// As [`Sums::push`].
-    unsafe fn none<S: Simd>() -> Self::OfLanes<S>;
-
-    /// Replaces one lane.
-    ///
-    /// # Safety
-    /// As [`Sums::push`].
-    unsafe fn put<S: Simd>(sums: &mut Self::OfLanes<S>, lane: usize, one: Self::Of1);
+        pair: &Pair,
+        run: &mut Self::OfRun,
+        at: usize,
+    ) -> u32;
 
     /// Notes windows of some lanes of a pair of groups, which is `at` in its run, from their points, without the rings'
     /// rounding; returns whether: else they are left to the plain form. What was noted of the pair before is lost.
@@ -142,12 +105,6 @@ pub(crate) trait Sums {
     ) -> bool {
         false
     }
-
-    /// Notes what the normals of the pixels from `at` on in a run are made from.
-    ///
-    /// # Safety
-    /// As [`Sums::push`].
-    unsafe fn note<S: Simd>(sums: Self::OfLanes<S>, run: &mut Self::OfRun, at: usize);
 
     /// The estimates of the pixels from `at` on in a run, which are solved; `sides` are those of their windows. Whether
     /// their sums are from [`Sums::afresh`], `fresh` tells.
@@ -174,28 +131,27 @@ pub(crate) struct Tile<'a> {
     /// No finite depth's magnitude is larger.
     pub deepest: f32,
     pub whole_points: bool,
+    pub sides: Sides<'a>,
 }
 
 /// A point farther from the camera's axis than the sums allow.
 struct BeyondLimit;
 
 impl Tile<'_> {
-    /// Computes the tile's normals. `sides` gives a row's sides of windows, readable up to a whole group. There is room
-    /// for the tile's frame.
+    /// Computes the tile's normals. There is room for its frame.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`; the sink's pixels of this tile are written by no one else.
     #[inline(always)]
-    pub unsafe fn compute<'r, S: Groups, M: Sums>(
+    pub unsafe fn compute<S: Groups, M: Sums>(
         &self,
         frame: &mut Frame,
         planes: &mut Planes,
         sums: &mut M,
-        sides: &impl Fn(usize) -> &'r [f32],
         sink: &Sink,
     ) {
         // SAFETY: as the caller's.
-        let side = unsafe { self.largest_side::<S>(sides) };
+        let side = unsafe { self.largest_side::<S>() };
         if side == 0 {
             for y in self.rows.clone() {
                 for x in self.columns.clone().step_by(GROUP) {
@@ -207,15 +163,14 @@ impl Tile<'_> {
         }
         let size = (self.image.width, self.image.height);
         *frame = Frame::around(&self.columns, &self.rows, side, size);
-        let origin = self.origin(sides);
+        let origin = self.origin();
         // Seldom is a point farther from the camera's axis than the deepest one from the camera.
         let (first, mut limit) =
             if M::LIMITED { ([0.0; 3], self.deepest) } else { (origin, f32::INFINITY) };
         sums.start(frame, self.deepest, side, first);
         loop {
             // SAFETY: as the caller's.
-            let done =
-                unsafe { self.rows::<S, M>(frame, planes, sums, sides, sink, side, origin, limit) };
+            let done = unsafe { self.rows::<S, M>(frame, planes, sums, sink, side, origin, limit) };
             let Err(BeyondLimit) = done else { break };
             // SAFETY: as the caller's.
             let extent = unsafe { self.extent::<S>(frame, planes, origin) };
@@ -261,12 +216,11 @@ impl Tile<'_> {
     /// As [`Tile::compute`].
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    unsafe fn rows<'r, S: Groups, M: Sums>(
+    unsafe fn rows<S: Groups, M: Sums>(
         &self,
         frame: &Frame,
         planes: &mut Planes,
         sums: &mut M,
-        sides: &impl Fn(usize) -> &'r [f32],
         sink: &Sink,
         side: usize,
         origin: [f32; 3],
@@ -294,7 +248,7 @@ impl Tile<'_> {
             let inner = self.inner(side, y);
             // SAFETY: as the caller's.
             unsafe {
-                self.row::<S, M>(frame, planes, sums, sides, sink, &mut run, y, &inner, hidden);
+                self.row::<S, M>(frame, planes, sums, sink, &mut run, y, &inner, hidden);
             }
         }
         Ok(())
@@ -305,12 +259,12 @@ impl Tile<'_> {
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn largest_side<'r, S: Groups>(&self, sides: &impl Fn(usize) -> &'r [f32]) -> usize {
+    unsafe fn largest_side<S: Groups>(&self) -> usize {
         // SAFETY: as the caller's; a row of sides is readable up to a whole group, and other pixels' sides do no harm.
         unsafe {
             let mut largest = S::splat(0.0);
             for y in self.rows.clone() {
-                let row = sides(y).as_ptr();
+                let row = self.sides.row(y).as_ptr();
                 let inside = self.columns.end - self.columns.len() % GROUP;
                 for x in (self.columns.start..inside).step_by(GROUP) {
                     largest = S::max(largest, S::load(row.add(x)));
@@ -327,10 +281,10 @@ impl Tile<'_> {
     }
 
     /// A finite point near the tile's middle: sums about it lose less.
-    fn origin<'r>(&self, sides: &impl Fn(usize) -> &'r [f32]) -> [f32; 3] {
+    fn origin(&self) -> [f32; 3] {
         let [(left, right), (above, below)] = [&self.columns, &self.rows].map(halves);
         for y in below.chain(above.rev()) {
-            let has_window = |x: &usize| sides(y)[*x] > 0.0;
+            let has_window = |x: &usize| self.sides.row(y)[*x] > 0.0;
             if let Some(x) = right.clone().chain(left.clone().rev()).find(has_window) {
                 return self.points.at(x, y).map(|c| if c.is_finite() { c } else { 0.0 });
             }
@@ -342,29 +296,25 @@ impl Tile<'_> {
     /// As [`Tile::compute`].
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    unsafe fn row<'r, S: Groups, M: Sums>(
+    unsafe fn row<S: Groups, M: Sums>(
         &self,
         frame: &Frame,
         planes: &Planes,
         sums: &M,
-        sides: &impl Fn(usize) -> &'r [f32],
         sink: &Sink,
         run: &mut Run<M>,
         y: usize,
         inner: &Range<usize>,
         hidden: bool,
     ) {
-        let row = sides(y);
+        let row = self.sides.row(y);
         for start in self.columns.clone().step_by(RUN) {
             run.length = 0;
             for x in (start..self.columns.end.min(start + RUN)).step_by(LANES) {
                 // SAFETY: as the caller's; a row of sides is readable up to a whole pair of groups.
                 unsafe {
-                    let pair = [
-                        Group::<S>::new(self, row, x, y, inner),
-                        Group::new(self, row, x + GROUP, y, inner),
-                    ];
-                    let windows = pair[0].windows | pair[1].windows << GROUP;
+                    let pair = Pair::new::<S>(self, row, x, y, inner);
+                    let windows = pair.windows;
                     if windows == 0 {
                         sink.write_none(x, y, (self.columns.end - x).min(LANES));
                         continue;
@@ -373,7 +323,7 @@ impl Tile<'_> {
                     let plain = if hidden {
                         windows
                     } else {
-                        self.pair::<S, M>(frame, planes, sums, sides, &pair, &mut run.sums, at)
+                        sums.note::<S>(self, frame, planes, &pair, &mut run.sums, at)
                     };
                     run.places[run.length] = (x, windows);
                     run.lanes[run.length] = windows & !plain;
@@ -501,183 +451,37 @@ impl Tile<'_> {
         }
     }
 
-    /// Notes the sums of the windows of two groups side by side, the first of which is `at` in its run; returns the
-    /// lanes whose windows are left to the plain form.
-    ///
-    /// # Safety
-    /// As [`Tile::compute`].
-    #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
-    unsafe fn pair<'r, S: Groups, M: Sums>(
-        &self,
-        frame: &Frame,
-        planes: &Planes,
-        sums: &M,
-        sides: &impl Fn(usize) -> &'r [f32],
-        groups: &[Group<S>; 2],
-        run: &mut M::OfRun,
-        at: usize,
-    ) -> u32 {
-        let [first, second] = groups;
-        // SAFETY: as the caller's; the frame holds the largest side around every pixel of the tile.
-        unsafe {
-            if let (Some(side), Some(other)) = (first.one_side(), second.one_side())
-                && side == other
-            {
-                if M::PAIRS {
-                    let both = sums.of_pixels::<S::Pair>(frame, planes, first.x, side);
-                    M::note::<S::Pair>(both, run, at);
-                } else {
-                    M::note::<S>(sums.of_pixels::<S>(frame, planes, first.x, side), run, at);
-                    let second = sums.of_pixels::<S>(frame, planes, second.x, side);
-                    M::note::<S>(second, run, at + GROUP);
-                }
-                return 0;
-            }
-            let first = self.group::<S, M>(frame, planes, sums, sides, first);
-            M::note::<S>(first.0, run, at);
-            let second = self.group::<S, M>(frame, planes, sums, sides, second);
-            M::note::<S>(second.0, run, at + GROUP);
-            first.1 | second.1 << GROUP
-        }
-    }
-
-    /// The sums of a group's windows, and the lanes whose windows are left to the plain form.
-    ///
-    /// # Safety
-    /// As [`Tile::compute`].
-    #[inline(always)]
-    unsafe fn group<'r, S: Groups, M: Sums>(
-        &self,
-        frame: &Frame,
-        planes: &Planes,
-        sums: &M,
-        sides: &impl Fn(usize) -> &'r [f32],
-        group: &Group<S>,
-    ) -> (M::OfLanes<S>, u32) {
-        let (mut plain, mut todo) = (0, group.windows);
-        // SAFETY: as the caller's; the frame holds the largest side around every pixel of the tile.
-        unsafe {
-            if todo == 0 {
-                return (M::none::<S>(), 0);
-            }
-            let (same, side) = group.next_windows(todo);
-            todo &= !same;
-            let mut of8 = if self.is_inside(group, same, side) {
-                sums.of_pixels::<S>(frame, planes, group.x, side)
-            } else {
-                let mut of8 = M::none::<S>();
-                plain |= self
-                    .put_crossing::<S, M>(frame, planes, sums, sides, group, same, side, &mut of8);
-                of8
-            };
-            while todo != 0 {
-                let (same, side) = group.next_windows(todo);
-                todo &= !same;
-                if self.is_inside(group, same, side) {
-                    let these = sums.of_pixels::<S>(frame, planes, group.x, side);
-                    of8 = M::select::<S>(same, these, of8);
-                } else {
-                    plain |= self.put_crossing::<S, M>(
-                        frame, planes, sums, sides, group, same, side, &mut of8,
-                    );
-                }
-            }
-            (of8, plain)
-        }
-    }
-
     /// The columns of row `y` around whose pixels windows of up to `side`, and the pixels around them, are inside the
     /// image.
     #[inline(always)]
-    fn inner(&self, side: usize, y: usize) -> Range<usize> {
+    pub fn inner(&self, side: usize, y: usize) -> Range<usize> {
         let Image { width, height, .. } = *self.image;
         // AVERAGE_DEPTH_CHANGE reaches one pixel further than the window.
         let (half, rest) = (side / 2, side / 2 + 1);
         if y > half && y + rest < height { half + 1..width.saturating_sub(rest) } else { 0..0 }
     }
 
-    /// Whether the windows of some lanes, and the pixels around them, are inside the image.
-    #[inline(always)]
-    fn is_inside<S: Groups>(&self, group: &Group<S>, lanes: u32, side: usize) -> bool {
-        if group.inner {
-            return true;
-        }
-        let first = lanes.trailing_zeros() as usize;
-        let last = (u32::BITS - 1 - lanes.leading_zeros()) as usize;
-        contains(&self.inner(side, group.y), group.x + first..=group.x + last)
-    }
-
-    /// Puts the sums of windows that cross the border of the image; returns the lanes left to the plain form.
-    ///
-    /// # Safety
-    /// As [`Tile::compute`].
-    #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
-    unsafe fn put_crossing<'r, S: Groups, M: Sums>(
-        &self,
-        frame: &Frame,
-        planes: &Planes,
-        sums: &M,
-        sides: &impl Fn(usize) -> &'r [f32],
-        group: &Group<S>,
-        lanes: u32,
-        side: usize,
-        of8: &mut M::OfLanes<S>,
-    ) -> u32 {
-        let pixel = (group.x, group.y);
-        let ones = self.crossing(frame, planes, sums, sides, pixel, lanes, side);
-        let mut plain = lanes;
-        for (lane, one) in ones.into_iter().enumerate() {
-            if let Some(one) = one {
-                // SAFETY: as the caller's.
-                unsafe { M::put::<S>(of8, lane, one) };
-                plain &= !(1 << lane);
-            }
-        }
-        plain
-    }
-
-    /// The sums of windows that cross the border of the image, but of those that are left to the plain form. `pixel`
-    /// is the group's first one.
-    // No instructions of `S` in here: they would not be inlined into a function of its own.
+    /// The lanes of a pair whose windows, and the pixels around them, are inside the image.
     #[cold]
-    #[allow(clippy::too_many_arguments)]
-    fn crossing<'r, M: Sums>(
-        &self,
-        frame: &Frame,
-        planes: &Planes,
-        sums: &M,
-        sides: &impl Fn(usize) -> &'r [f32],
-        pixel: (usize, usize),
-        lanes: u32,
-        side: usize,
-    ) -> [Option<M::Of1>; GROUP] {
-        std::array::from_fn(|lane| {
-            let pixel = (pixel.0 + lane, pixel.1);
-            if lanes >> lane & 1 == 0 || !self.has_only_finite(pixel, side, sides) {
-                return None;
-            }
-            sums.of_mirrored(frame, planes, self.image, pixel, side)
-        })
+    pub fn inside(&self, pair: &Pair) -> u32 {
+        let is_inside = |lane: &usize| {
+            let x = pair.x + lane;
+            self.inner(pair.row[x] as usize, pair.y).contains(&x)
+        };
+        Bits(pair.windows).filter(is_inside).fold(0, |lanes, lane| lanes | 1 << lane)
     }
 
     /// Whether a mirrored window certainly holds finite points only.
     ///
     /// Distances are too large in the image's outermost rows and columns, where only one of the passes works;
     /// there, the next pixel inwards must have as large a window.
-    fn has_only_finite<'r>(
-        &self,
-        (x, y): (usize, usize),
-        side: usize,
-        sides: &impl Fn(usize) -> &'r [f32],
-    ) -> bool {
+    pub fn has_only_finite(&self, (x, y): (usize, usize), side: usize) -> bool {
         let Image { width, height, border_policy } = *self.image;
         if border_policy != BorderPolicy::Mirror || side > width.min(height) {
             return false;
         }
         let inner = (x.clamp(1, width - 2), y.clamp(1, height - 2));
-        inner == (x, y) || sides(inner.1)[inner.0] as usize >= side
+        inner == (x, y) || self.sides.row(inner.1)[inner.0] as usize >= side
     }
 }
 
@@ -689,7 +493,7 @@ fn halves(range: &Range<usize>) -> (Range<usize>, Range<usize>) {
 
 /// Whether a range has all of another, which is not empty.
 #[inline(always)]
-fn contains(range: &Range<usize>, other: RangeInclusive<usize>) -> bool {
+pub(crate) fn contains(range: &Range<usize>, other: RangeInclusive<usize>) -> bool {
     range.start <= *other.start() && *other.end() < range.end
 }
 
@@ -712,61 +516,42 @@ impl<M: Sums> Default for Run<M> {
     }
 }
 
-/// Eight pixels of a row and their windows.
-struct Group<'a, S: Groups> {
+/// Two groups of pixels of a row, side by side, and their windows.
+pub(crate) struct Pair<'a> {
     /// The first pixel.
-    x: usize,
-    y: usize,
-    /// The row's sides of windows, and the eight pixels'.
-    row: &'a [f32],
-    sides: S::F,
+    pub x: usize,
+    pub y: usize,
+    /// The sides of the row's windows.
+    pub row: &'a [f32],
     /// The lanes that have a window.
-    windows: u32,
-    /// Whether windows of any of the tile's sides are inside the image here.
-    inner: bool,
+    pub windows: u32,
+    /// The columns where windows of any of the tile's sides are inside the image.
+    inner: &'a Range<usize>,
 }
 
-impl<'a, S: Groups> Group<'a, S> {
+impl<'a> Pair<'a> {
     /// # Safety
-    /// The processor has the instruction set of `S`; the row is readable from `x` up to a whole group.
+    /// The processor has the instruction set of `S`; the row is readable from `x` up to a whole pair.
     #[inline(always)]
-    unsafe fn new(tile: &Tile, row: &'a [f32], x: usize, y: usize, inner: &Range<usize>) -> Self {
-        let count = tile.columns.end.saturating_sub(x).min(GROUP);
+    unsafe fn new<S: Groups>(
+        tile: &Tile,
+        row: &'a [f32],
+        x: usize,
+        y: usize,
+        inner: &'a Range<usize>,
+    ) -> Self {
+        let count = (tile.columns.end - x).min(LANES);
         // SAFETY: as the caller's.
-        unsafe {
-            let sides = S::load(row.as_ptr().add(x));
-            let windows = S::bits(S::lt(S::splat(0.0), sides)) & ((1 << count) - 1);
-            let inner = contains(inner, x..=x + GROUP - 1);
-            Group { x, y, row, sides, windows, inner }
-        }
+        let sides = unsafe { S::Pair::load(row.as_ptr().add(x)) };
+        // SAFETY: as the caller's.
+        let windows = unsafe { S::Pair::bits(S::Pair::lt(S::Pair::splat(0.0), sides)) };
+        Pair { x, y, row, windows: windows & ((1 << count) - 1), inner }
     }
 
-    /// The side of all its windows, if they have the same and are inside the image.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
+    /// Whether windows of any of the tile's sides are inside the image for so many pixels from a lane on.
     #[inline(always)]
-    unsafe fn one_side(&self) -> Option<usize> {
-        if self.windows == 0 || !self.inner {
-            return None;
-        }
-        // SAFETY: as the caller's.
-        let (same, side) = unsafe { self.next_windows(self.windows) };
-        (same == self.windows).then_some(side)
-    }
-
-    /// The first of the lanes `todo` and those with windows of the same side; and that side.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    unsafe fn next_windows(&self, todo: u32) -> (u32, usize) {
-        let side = self.row[self.x + todo.trailing_zeros() as usize];
-        // SAFETY: as the caller's; sides are whole numbers that fit i32.
-        unsafe {
-            let same = S::bits(S::eq(self.sides, S::splat(side))) & todo;
-            (same, side.to_int_unchecked::<i32>() as usize)
-        }
+    pub fn is_inner(&self, lane: usize, count: usize) -> bool {
+        contains(self.inner, self.x + lane..=self.x + lane + count - 1)
     }
 }
 

@@ -64,6 +64,7 @@ impl Simd for Avx512 {
         round_i(a: Self::F) -> Self::I = Avx2::round_i;
         truncate_i(a: Self::F) -> Self::I = Avx2::truncate_i;
         float_i(a: Self::I) -> Self::F = Avx2::float_i;
+        load_points(first: *const f32, step: usize) -> [Self::F; 3] = Avx2::load_points;
 
         splat_d(value: f64) -> Self::D = _mm512_set1_pd;
         load_d(from: *const f64) -> Self::D = _mm512_loadu_pd;
@@ -101,6 +102,7 @@ impl Along for Avx512 {
         transpose_fours(rows: [Self::F; 4]) -> [Self::F; 4] = Avx2::transpose_fours;
         prefix_sum_i(a: Self::I) -> Self::I = Avx2::prefix_sum_i;
         last_i(a: Self::I) -> Self::I = Avx2::last_i;
+        store_by_lanes(rows: [Self::I; 8], to: *mut i32) = Avx2::store_by_lanes;
     }
 }
 
@@ -236,6 +238,27 @@ impl Simd for Avx512Pair {
             _mm512_insertf32x8::<1>(low, Avx512::narrow(a[1]))
         }
     }
+
+    #[inline(always)]
+    unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
+        unsafe {
+            if step != size_of::<[f32; 4]>() {
+                return load_points_by_fours::<Self>(first, step);
+            }
+            let [a, b, c, d] = [0, 1, 2, 3].map(|i| _mm512_loadu_ps(first.add(16 * i)));
+            // Of eight points: x and y, or z.
+            let xy = _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);
+            let z = _mm512_setr_epi32(2, 6, 10, 14, 18, 22, 26, 30, 0, 0, 0, 0, 0, 0, 0, 0);
+            let (xy_ab, xy_cd) =
+                (_mm512_permutex2var_ps(a, xy, b), _mm512_permutex2var_ps(c, xy, d));
+            let (z_ab, z_cd) = (_mm512_permutex2var_ps(a, z, b), _mm512_permutex2var_ps(c, z, d));
+            [
+                _mm512_shuffle_f32x4::<0x44>(xy_ab, xy_cd),
+                _mm512_shuffle_f32x4::<0xee>(xy_ab, xy_cd),
+                _mm512_shuffle_f32x4::<0x44>(z_ab, z_cd),
+            ]
+        }
+    }
 }
 
 impl Along for Avx512Pair {
@@ -262,23 +285,28 @@ impl Along for Avx512Pair {
         }
     }
     #[inline(always)]
-    unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
+    unsafe fn store_by_lanes([a, b, c, d, e, f, g, h]: [Self::I; 8], to: *mut i32) {
         unsafe {
-            if step != size_of::<[f32; 4]>() {
-                return load_points_by_fours::<Self>(first, step);
+            let cast = |a| _mm512_castsi512_ps(a);
+            let first = Self::transpose_fours([cast(a), cast(b), cast(c), cast(d)]);
+            let second = Self::transpose_fours([cast(e), cast(f), cast(g), cast(h)]);
+            // Lanes 0 to 3 and 4 to 7, or 8 to 11 and 12 to 15, of both.
+            let low = _mm512_setr_epi64(0, 1, 8, 9, 2, 3, 10, 11);
+            let high = _mm512_setr_epi64(4, 5, 12, 13, 6, 7, 14, 15);
+            for i in 0..4 {
+                let (first, second) =
+                    (_mm512_castps_si512(first[i]), _mm512_castps_si512(second[i]));
+                let fours = [
+                    _mm512_permutex2var_epi64(first, low, second),
+                    _mm512_permutex2var_epi64(first, high, second),
+                ];
+                for half in 0..2 {
+                    let to = to.add(8 * (8 * half + i));
+                    _mm256_storeu_si256(to.cast(), _mm512_castsi512_si256(fours[half]));
+                    let upper = _mm512_extracti64x4_epi64::<1>(fours[half]);
+                    _mm256_storeu_si256(to.add(8 * 4).cast(), upper);
+                }
             }
-            let [a, b, c, d] = [0, 1, 2, 3].map(|i| _mm512_loadu_ps(first.add(16 * i)));
-            // Of eight points: x and y, or z.
-            let xy = _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);
-            let z = _mm512_setr_epi32(2, 6, 10, 14, 18, 22, 26, 30, 0, 0, 0, 0, 0, 0, 0, 0);
-            let (xy_ab, xy_cd) =
-                (_mm512_permutex2var_ps(a, xy, b), _mm512_permutex2var_ps(c, xy, d));
-            let (z_ab, z_cd) = (_mm512_permutex2var_ps(a, z, b), _mm512_permutex2var_ps(c, z, d));
-            [
-                _mm512_shuffle_f32x4::<0x44>(xy_ab, xy_cd),
-                _mm512_shuffle_f32x4::<0xee>(xy_ab, xy_cd),
-                _mm512_shuffle_f32x4::<0x44>(z_ab, z_cd),
-            ]
         }
     }
     #[inline(always)]

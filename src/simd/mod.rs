@@ -87,6 +87,9 @@ pub(crate) trait Simd: Copy {
     /// f64 to f32.
     unsafe fn narrow(a: Self::D) -> Self::F;
 
+    /// The first, second and third of each four floats, `step` bytes from one lane's to the next one's.
+    unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3];
+
     /// `mask ? yes : no`
     #[inline(always)]
     unsafe fn select(mask: Self::F, yes: Self::F, no: Self::F) -> Self::F {
@@ -133,12 +136,8 @@ pub(crate) trait Along: Simd {
     /// Lane i of row j becomes lane j of row i, among each four lanes.
     unsafe fn transpose_fours(rows: [Self::F; 4]) -> [Self::F; 4];
 
-    /// The first, second and third of each four floats, `step` bytes from one lane's to the next one's.
-    #[inline(always)]
-    unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
-        // SAFETY: as the caller's.
-        unsafe { load_points_by_fours::<Self>(first, step) }
-    }
+    /// Lane l of row i becomes number 8 l + i from `to` on.
+    unsafe fn store_by_lanes(rows: [Self::I; 8], to: *mut i32);
 
     /// Lane l becomes the sum of lanes 0 to l.
     unsafe fn prefix_sum_i(a: Self::I) -> Self::I;

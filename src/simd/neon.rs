@@ -6,7 +6,7 @@
 use std::arch::aarch64::*;
 
 use super::twice::Twice;
-use super::{Along, GROUP, Groups, Simd};
+use super::{Along, GROUP, Groups, Simd, load_points_by_fours};
 
 /// What every 64-bit Arm has.
 #[derive(Clone, Copy)]
@@ -291,6 +291,10 @@ impl Simd for Neon {
             ]
         }
     }
+    #[inline(always)]
+    unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
+        unsafe { load_points_by_fours::<Self>(first, step) }
+    }
 }
 
 impl Along for Neon {
@@ -334,6 +338,22 @@ impl Along for Neon {
     #[inline(always)]
     unsafe fn last_i(a: Self::I) -> Self::I {
         unsafe { [vdupq_laneq_s32::<3>(a[1]); 2] }
+    }
+    #[inline(always)]
+    unsafe fn store_by_lanes(rows: [Self::I; 8], to: *mut i32) {
+        unsafe {
+            let [a, b, c, d, e, f, g, h] =
+                rows.map(|row| [vreinterpretq_f32_s32(row[0]), vreinterpretq_f32_s32(row[1])]);
+            let fours = [Self::transpose_fours([a, b, c, d]), Self::transpose_fours([e, f, g, h])];
+            for half in 0..2 {
+                for four in 0..2 {
+                    for lane in 0..4 {
+                        let to = to.add(8 * (4 * half + lane) + 4 * four);
+                        vst1q_s32(to, vreinterpretq_s32_f32(fours[four][lane][half]));
+                    }
+                }
+            }
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Eight lanes without any instruction set: what processors without a path of their own use.
 
 use super::twice::Twice;
-use super::{Along, GROUP, Groups, Simd};
+use super::{Along, GROUP, Groups, Simd, load_points_by_fours};
 
 #[derive(Clone, Copy)]
 pub(crate) struct Portable;
@@ -242,6 +242,11 @@ impl Simd for Portable {
     unsafe fn narrow(a: D) -> F {
         zip(a, a, |a, _| a as f32)
     }
+    #[inline(always)]
+    unsafe fn load_points(first: *const f32, step: usize) -> [F; 3] {
+        // SAFETY: as the caller's.
+        unsafe { load_points_by_fours::<Self>(first, step) }
+    }
 }
 
 impl Along for Portable {
@@ -261,6 +266,13 @@ impl Along for Portable {
     #[inline(always)]
     unsafe fn last_i(a: I) -> I {
         [a[GROUP - 1]; GROUP]
+    }
+    #[inline(always)]
+    unsafe fn store_by_lanes(rows: [I; 8], to: *mut i32) {
+        for lane in 0..GROUP {
+            // SAFETY: promised by the caller.
+            unsafe { to.add(8 * lane).cast::<I>().write_unaligned(rows.map(|row| row[lane])) };
+        }
     }
 }
 

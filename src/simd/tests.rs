@@ -165,7 +165,7 @@ unsafe fn of_groups<S: Groups>(a: &[f32; 16], b: &[f32; 16]) -> Results {
 /// The processor has the instruction set of `S`.
 unsafe fn assert_goes_along<S: Along>() {
     let floats: [f32; 256] = std::array::from_fn(|i| i as f32);
-    let integers: [i32; 16] = std::array::from_fn(|i| (i as i32 - 5).pow(9));
+    let integers: [i32; 24] = std::array::from_fn(|i| (i as i32).wrapping_pow(9));
     let bits = |v: &f32| u64::from(v.to_bits());
     let (mut found, mut expected) = (Results::default(), Results::default());
     // SAFETY: as the caller's; all places are inside the floats.
@@ -179,11 +179,13 @@ unsafe fn assert_goes_along<S: Along>() {
         let lanes = (0..4).flat_map(|i| (0..S::LANES).map(move |l| 16 * (l % 4) + l / 4 * 4 + i));
         expected.0.extend(lanes.map(|at| bits(&floats[at])));
 
-        for step in [3, 4, 5, 8] {
-            found.floats::<S>(S::load_points(from.add(1), step * size_of::<f32>()));
-            let lanes = (0..3).flat_map(|c| (0..S::LANES).map(move |l| 1 + l * step + c));
-            expected.0.extend(lanes.map(|at| bits(&floats[at])));
-        }
+        let rows = [0, 1, 2, 3, 4, 5, 6, 7].map(|row| S::load_i(integers.as_ptr().add(row)));
+        let mut by_lanes = [0_i32; 8 * 16];
+        S::store_by_lanes(rows, by_lanes.as_mut_ptr());
+        found.0.extend(by_lanes.map(|integer| integer as u64));
+        let stored =
+            (0..16).flat_map(|l| (0..8).map(move |i| if l < S::LANES { l + i } else { 0 }));
+        expected.0.extend(stored.map(|at| integers[at] as u64));
 
         let mut carry = S::splat_i(7);
         for _ in 0..2 {
@@ -198,6 +200,25 @@ unsafe fn assert_goes_along<S: Along>() {
         expected.0.extend((0..S::LANES).map(|_| sum as u64));
     }
     assert_eq!(found, expected);
+}
+
+/// Points are taken apart, however far apart they are.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+unsafe fn assert_loads_points<S: Simd>() {
+    let floats: [f32; 256] = std::array::from_fn(|i| i as f32);
+    for step in [3, 4, 5, 8] {
+        let (mut found, mut expected) = (Results::default(), Results::default());
+        // SAFETY: as the caller's; all points are inside the floats.
+        unsafe {
+            let from = floats.as_ptr().add(1);
+            found.floats::<S>(S::load_points(from, step * size_of::<f32>()));
+        }
+        let lanes = (0..3).flat_map(|c| (0..S::LANES).map(move |l| 1 + l * step + c));
+        expected.0.extend(lanes.map(|at| u64::from(floats[at].to_bits())));
+        assert_eq!(found, expected, "{step} floats apart");
+    }
 }
 
 /// Integers of numbers that fit, to the nearest and towards zero.
@@ -220,6 +241,9 @@ unsafe fn assert_as_portable<S: Groups>() {
         assert_goes_along::<Portable>();
         assert_goes_along::<S>();
         assert_goes_along::<S::Widest>();
+        assert_loads_points::<Portable>();
+        assert_loads_points::<S>();
+        assert_loads_points::<S::Pair>();
     }
     for (a, b) in floats() {
         // SAFETY: as the caller's, and the portable path runs everywhere.

@@ -106,6 +106,15 @@ impl<S: Simd> Simd for Twice<S> {
         }
     }
     #[inline(always)]
+    unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
+        // SAFETY: as the caller's.
+        unsafe {
+            let [x0, y0, z0] = S::load_points(first, step);
+            let [x1, y1, z1] = S::load_points(first.byte_add(S::LANES * step), step);
+            [[x0, x1], [y0, y1], [z0, z1]]
+        }
+    }
+    #[inline(always)]
     unsafe fn mask(bits: u32) -> Self::F {
         // SAFETY: as the caller's.
         unsafe { [S::mask(bits), S::mask(bits >> super::GROUP)] }

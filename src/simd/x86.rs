@@ -6,7 +6,7 @@
 use std::arch::x86_64::*;
 
 use super::twice::Twice;
-use super::{Along, GROUP, Groups, Simd};
+use super::{Along, GROUP, Groups, Simd, load_points_by_fours};
 
 /// What every x86-64 has.
 #[derive(Clone, Copy)]
@@ -238,6 +238,10 @@ impl Simd for Sse2 {
             ]
         }
     }
+    #[inline(always)]
+    unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
+        unsafe { load_points_by_fours::<Self>(first, step) }
+    }
 }
 
 impl Along for Sse2 {
@@ -270,6 +274,21 @@ impl Along for Sse2 {
     #[inline(always)]
     unsafe fn last_i(a: Self::I) -> Self::I {
         unsafe { [_mm_shuffle_epi32::<0xff>(a[1]); 2] }
+    }
+    #[inline(always)]
+    unsafe fn store_by_lanes(rows: [Self::I; 8], to: *mut i32) {
+        for half in 0..2 {
+            for four in 0..2 {
+                unsafe {
+                    let [mut a, mut b, mut c, mut d] =
+                        [0, 1, 2, 3].map(|i| _mm_castsi128_ps(rows[4 * four + i][half]));
+                    _MM_TRANSPOSE4_PS(&mut a, &mut b, &mut c, &mut d);
+                    for (lane, row) in [a, b, c, d].into_iter().enumerate() {
+                        _mm_storeu_ps(to.add(8 * (4 * half + lane) + 4 * four).cast(), row);
+                    }
+                }
+            }
+        }
     }
 }
 
@@ -513,6 +532,10 @@ impl Simd for Avx2 {
     unsafe fn narrow(a: Self::D) -> Self::F {
         unsafe { _mm256_set_m128(_mm256_cvtpd_ps(a[1]), _mm256_cvtpd_ps(a[0])) }
     }
+    #[inline(always)]
+    unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
+        unsafe { load_points_by_fours::<Self>(first, step) }
+    }
 }
 
 impl Along for Avx2 {
@@ -546,6 +569,20 @@ impl Along for Avx2 {
     #[inline(always)]
     unsafe fn last_i(a: Self::I) -> Self::I {
         unsafe { _mm256_permutevar8x32_epi32(a, _mm256_set1_epi32(7)) }
+    }
+    #[inline(always)]
+    unsafe fn store_by_lanes([a, b, c, d, e, f, g, h]: [Self::I; 8], to: *mut i32) {
+        unsafe {
+            let cast = |a| _mm256_castsi256_ps(a);
+            let first = Self::transpose_fours([cast(a), cast(b), cast(c), cast(d)]);
+            let second = Self::transpose_fours([cast(e), cast(f), cast(g), cast(h)]);
+            for i in 0..4 {
+                let low = _mm256_permute2f128_ps::<0x20>(first[i], second[i]);
+                let high = _mm256_permute2f128_ps::<0x31>(first[i], second[i]);
+                _mm256_storeu_ps(to.add(8 * i).cast(), low);
+                _mm256_storeu_ps(to.add(8 * (4 + i)).cast(), high);
+            }
+        }
     }
 }
 

@@ -1,0 +1,267 @@
+//! Windows of one size for all pixels of a group at once: as many times as a group has sizes.
+
+use super::planes::{Frame, Planes};
+use super::tile::{Pair, Sums, Tile, contains};
+use crate::simd::{GROUP, Groups, Simd};
+use crate::window::Image;
+
+/// Sums whose lanes are pixels side by side, with windows of one size.
+pub(crate) trait BySide: Sums {
+    /// The sums of as many windows as there are lanes.
+    type OfLanes<S: Simd>: Copy;
+    /// The sums of one window.
+    type Of1;
+
+    /// Whether pairs of groups are summed as such: not where a group's sums fill the registers.
+    const PAIRS: bool;
+
+    /// The sums of the windows of `side` x `side` around the pixels from `x` on, one in each lane, of the row aimed
+    /// at. The windows, and the pixels around them, lie inside the image and hold finite points only.
+    ///
+    /// # Safety
+    /// As [`Sums::note`].
+    unsafe fn of_pixels<S: Simd>(
+        &self,
+        frame: &Frame,
+        planes: &Planes,
+        x: usize,
+        side: usize,
+    ) -> Self::OfLanes<S>;
+
+    /// `mask ? yes : no`
+    ///
+    /// # Safety
+    /// As [`Sums::push`].
+    unsafe fn select<S: Simd>(
+        lanes: u32,
+        yes: Self::OfLanes<S>,
+        no: Self::OfLanes<S>,
+    ) -> Self::OfLanes<S>;
+
+    /// The sums of one window that crosses the border of the image and is mirrored there; none if this method
+    /// leaves such windows to the plain form.
+    fn of_mirrored(
+        &self,
+        frame: &Frame,
+        planes: &Planes,
+        image: &Image,
+        pixel: (usize, usize),
+        side: usize,
+    ) -> Option<Self::Of1>;
+
+    /// Sums to put lanes into.
+    ///
+    /// # Safety
+    /// As [`Sums::push`].
+    unsafe fn none<S: Simd>() -> Self::OfLanes<S>;
+
+    /// Replaces one lane.
+    ///
+    /// # Safety
+    /// As [`Sums::push`].
+    unsafe fn put<S: Simd>(sums: &mut Self::OfLanes<S>, lane: usize, one: Self::Of1);
+
+    /// Notes what the normals of the pixels from `at` on in a run are made from.
+    ///
+    /// # Safety
+    /// As [`Sums::push`].
+    unsafe fn note_lanes<S: Simd>(sums: Self::OfLanes<S>, run: &mut Self::OfRun, at: usize);
+}
+
+/// [`Sums::note`]
+///
+/// # Safety
+/// As there.
+#[inline(always)]
+pub(crate) unsafe fn note<S: Groups, M: BySide>(
+    sums: &M,
+    tile: &Tile,
+    frame: &Frame,
+    planes: &Planes,
+    pair: &Pair,
+    run: &mut M::OfRun,
+    at: usize,
+) -> u32 {
+    // SAFETY: as the caller's; the frame holds the largest side around every pixel of the tile.
+    unsafe {
+        let [first, second] = [Group::<S>::new(pair, 0), Group::new(pair, GROUP)];
+        if let (Some(side), Some(other)) = (first.one_side(), second.one_side())
+            && side == other
+        {
+            if M::PAIRS {
+                let both = sums.of_pixels::<S::Pair>(frame, planes, first.x, side);
+                M::note_lanes::<S::Pair>(both, run, at);
+            } else {
+                let first = sums.of_pixels::<S>(frame, planes, first.x, side);
+                M::note_lanes::<S>(first, run, at);
+                let second = sums.of_pixels::<S>(frame, planes, second.x, side);
+                M::note_lanes::<S>(second, run, at + GROUP);
+            }
+            return 0;
+        }
+        let (of8, plain) = first.sum_up(sums, tile, frame, planes);
+        M::note_lanes::<S>(of8, run, at);
+        let (of8, more_plain) = second.sum_up(sums, tile, frame, planes);
+        M::note_lanes::<S>(of8, run, at + GROUP);
+        plain | more_plain << GROUP
+    }
+}
+
+/// Eight pixels of a row and their windows.
+struct Group<'a, S: Groups> {
+    /// The first pixel.
+    x: usize,
+    y: usize,
+    /// The row's sides of windows, and the eight pixels'.
+    row: &'a [f32],
+    sides: S::F,
+    /// The lanes that have a window.
+    windows: u32,
+    /// Whether windows of any of the tile's sides are inside the image here.
+    inner: bool,
+}
+
+impl<'a, S: Groups> Group<'a, S> {
+    /// The group of a pair that begins with `lane`.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`; the row is readable up to a whole pair.
+    #[inline(always)]
+    unsafe fn new(pair: &Pair<'a>, lane: usize) -> Self {
+        let (x, y, row) = (pair.x + lane, pair.y, pair.row);
+        let windows = pair.windows >> lane & ((1 << GROUP) - 1);
+        // SAFETY: as the caller's.
+        let sides = unsafe { S::load(row.as_ptr().add(x)) };
+        Group { x, y, row, sides, windows, inner: pair.is_inner(lane, GROUP) }
+    }
+
+    /// The side of all its windows, if they have the same and are inside the image.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn one_side(&self) -> Option<usize> {
+        if self.windows == 0 || !self.inner {
+            return None;
+        }
+        // SAFETY: as the caller's.
+        let (same, side) = unsafe { self.next_windows(self.windows) };
+        (same == self.windows).then_some(side)
+    }
+
+    /// The first of the lanes `todo` and those with windows of the same side; and that side.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn next_windows(&self, todo: u32) -> (u32, usize) {
+        let side = self.row[self.x + todo.trailing_zeros() as usize];
+        // SAFETY: as the caller's; sides are whole numbers that fit i32.
+        unsafe {
+            let same = S::bits(S::eq(self.sides, S::splat(side))) & todo;
+            (same, side.to_int_unchecked::<i32>() as usize)
+        }
+    }
+
+    /// The sums of the windows, and the lanes whose windows are left to the plain form.
+    ///
+    /// # Safety
+    /// As [`note`].
+    #[inline(always)]
+    unsafe fn sum_up<M: BySide>(
+        &self,
+        sums: &M,
+        tile: &Tile,
+        frame: &Frame,
+        planes: &Planes,
+    ) -> (M::OfLanes<S>, u32) {
+        let (mut plain, mut todo) = (0, self.windows);
+        // SAFETY: as the caller's.
+        unsafe {
+            if todo == 0 {
+                return (M::none::<S>(), 0);
+            }
+            let (same, side) = self.next_windows(todo);
+            todo &= !same;
+            let mut of8 = if self.is_inside(tile, same, side) {
+                sums.of_pixels::<S>(frame, planes, self.x, side)
+            } else {
+                let mut of8 = M::none::<S>();
+                plain |= self.put_crossing(sums, tile, frame, planes, same, side, &mut of8);
+                of8
+            };
+            while todo != 0 {
+                let (same, side) = self.next_windows(todo);
+                todo &= !same;
+                if self.is_inside(tile, same, side) {
+                    let these = sums.of_pixels::<S>(frame, planes, self.x, side);
+                    of8 = M::select::<S>(same, these, of8);
+                } else {
+                    plain |= self.put_crossing(sums, tile, frame, planes, same, side, &mut of8);
+                }
+            }
+            (of8, plain)
+        }
+    }
+
+    /// Whether the windows of some lanes, and the pixels around them, are inside the image.
+    #[inline(always)]
+    fn is_inside(&self, tile: &Tile, lanes: u32, side: usize) -> bool {
+        if self.inner {
+            return true;
+        }
+        let first = lanes.trailing_zeros() as usize;
+        let last = (u32::BITS - 1 - lanes.leading_zeros()) as usize;
+        contains(&tile.inner(side, self.y), self.x + first..=self.x + last)
+    }
+
+    /// Puts the sums of windows that cross the border of the image; returns the lanes left to the plain form.
+    ///
+    /// # Safety
+    /// As [`note`].
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments)]
+    unsafe fn put_crossing<M: BySide>(
+        &self,
+        sums: &M,
+        tile: &Tile,
+        frame: &Frame,
+        planes: &Planes,
+        lanes: u32,
+        side: usize,
+        of8: &mut M::OfLanes<S>,
+    ) -> u32 {
+        let ones = crossing(sums, tile, frame, planes, (self.x, self.y), lanes, side);
+        let mut plain = lanes;
+        for (lane, one) in ones.into_iter().enumerate() {
+            if let Some(one) = one {
+                // SAFETY: as the caller's.
+                unsafe { M::put::<S>(of8, lane, one) };
+                plain &= !(1 << lane);
+            }
+        }
+        plain
+    }
+}
+
+/// The sums of windows that cross the border of the image, but of those that are left to the plain form. `pixel`
+/// is the group's first one.
+// No instructions of `S` in here: they would not be inlined into a function of its own.
+#[cold]
+fn crossing<M: BySide>(
+    sums: &M,
+    tile: &Tile,
+    frame: &Frame,
+    planes: &Planes,
+    pixel: (usize, usize),
+    lanes: u32,
+    side: usize,
+) -> [Option<M::Of1>; GROUP] {
+    std::array::from_fn(|lane| {
+        let pixel = (pixel.0 + lane, pixel.1);
+        if lanes >> lane & 1 == 0 || !tile.has_only_finite(pixel, side) {
+            return None;
+        }
+        sums.of_mirrored(frame, planes, tile.image, pixel, side)
+    })
+}

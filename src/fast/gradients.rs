@@ -1,0 +1,76 @@
+//! What the two gradient methods have in common: coordinates as integers, and normals from two gradients.
+//!
+//! The integers are multiples of a power of two: their sums are exact whatever wraps around between, as long as the
+//! differences fit, and the limit on the coordinates sees to that.
+
+use super::arithmetic::{Floats, cross, dot};
+use super::tile::Found;
+use crate::simd::Simd;
+
+/// How coordinates become integers.
+#[derive(Debug, Default)]
+pub(crate) struct Scale {
+    origin: [f32; 3],
+    scale: f32,
+    /// Of [`DOUBT_ROUNDING`].
+    doubt: f32,
+}
+
+/// Rounding to integers moves a sum of 4 `side` coordinates by about sqrt(side). A normal is doubtful where that could
+/// turn it by more than 1e-4, or where floats could: (sine of the angle between the tangents) < 1e-3.
+const DOUBT_ROUNDING: f32 = 4e8;
+const DOUBT_SINE: f32 = 1e-6;
+
+impl Scale {
+    /// For sums of 4 `side` coordinates, none of which is farther than `limit` from the origin.
+    pub fn new(limit: f32, side: usize, origin: [f32; 3]) -> Self {
+        // 4 side limit scale < 2^31, and a power of two.
+        let mut bits = 29.0 - (f64::from(limit) * side as f64).log2();
+        let mut doubt = DOUBT_ROUNDING;
+        if origin != [0.0; 3] {
+            // The way from there is rounded to a float first: for limit scale < 2^25 that at most doubles the error.
+            bits = bits.min(25.0 - f64::from(limit).log2());
+            doubt *= 4.0;
+        }
+        Scale { origin, scale: bits.floor().clamp(-120.0, 120.0).exp2() as f32, doubt }
+    }
+
+    /// Coordinates `c`, as integers.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn integers<S: Simd>(&self, c: usize, coordinates: S::F) -> S::I {
+        // SAFETY: as the caller's.
+        unsafe {
+            let from_origin = S::sub(coordinates, S::splat(self.origin[c]));
+            S::round_i(S::mul(from_origin, S::splat(self.scale)))
+        }
+    }
+
+    /// The normals to sums of horizontal and of vertical gradients, over windows of these sides.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn normals<S: Simd>(
+        &self,
+        h: [Floats<S>; 3],
+        v: [Floats<S>; 3],
+        sides: S::F,
+    ) -> Found<S> {
+        // SAFETY: as the caller's.
+        unsafe {
+            let n = cross(v, h);
+            let (n2, h2, v2) = (dot(n, n), dot(h, h), dot(v, v));
+            let rounding = Floats(sides) * Floats::splat(self.doubt) * (h2 + v2);
+            let sine = h2 * v2 * Floats::splat(DOUBT_SINE);
+            let scale = Floats::splat(1.0) / n2.sqrt();
+            Found {
+                normal: [n[0] * scale, n[1] * scale, n[2] * scale],
+                curvature: Floats::splat(f32::NAN),
+                doubtful: !rounding.max(sine).lt(n2),
+            }
+        }
+    }
+}

@@ -1,0 +1,295 @@
+//! Sums of pairs of strips, for AVERAGE_3D_GRADIENT.
+//!
+//! Over a whole window the sum of P(x+1) - P(x-1) telescopes to the window's last column and the one after, minus its
+//! first and the one before; so two prefix sums, down the columns and along the rows, give both gradients. The two are
+//! held side by side, each counted from where both have the same corners: a pixel's gradients are four reads,
+//! whatever the windows of its neighbours.
+
+use super::arithmetic::Floats;
+use super::buffer::Buffer;
+use super::gradients::Scale;
+use super::lanes::LANES;
+use super::planes::{Frame, MARGIN, Planes};
+use super::run::{Noted, RUN};
+use super::tile::{Bits, Found, Pair, Sums, Tile};
+use crate::Error;
+use crate::memory::{bytes, make_room};
+use crate::simd::{Along, GROUP, Groups, Simd};
+use crate::window::Image;
+
+/// Of a pixel (x, y), or between the corners of a window: x, y and z and nothing of the sum of columns x - 1 and x
+/// down to row y; and of the sum of rows y and y + 1 up to column x - 1.
+type Both<T> = [T; GROUP];
+
+/// Bytes from a pixel to the next.
+const PIXEL: usize = size_of::<Both<i32>>();
+
+/// Where the second of both begins.
+const VERTICAL: usize = 4;
+
+/// The ring of prefix sums.
+#[derive(Debug, Default)]
+pub(crate) struct StripPairs {
+    ring: Buffer<Both<i32>>,
+    /// Three planes of one row: the sums down to the row pushed last, that row, and the one before it.
+    columns: Buffer<i32>,
+    last: Buffer<i32>,
+    above: Buffer<i32>,
+    scale: Scale,
+    /// By the side of a window: its left corners above and below, in bytes, which addresses are made of at once. A
+    /// window of no side is of no sum.
+    places: Vec<[usize; 2]>,
+}
+
+/// Horizontal and vertical gradients of a run's pixels.
+#[repr(C, align(64))]
+pub(crate) struct Gradients([Both<f32>; RUN]);
+
+impl Default for Gradients {
+    fn default() -> Self {
+        Gradients([[0.0; GROUP]; RUN])
+    }
+}
+
+impl Noted for Gradients {}
+
+impl StripPairs {
+    /// Adds row `y` of the planes, which completes the sums of the row above.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn push_row<S: Along>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
+        std::mem::swap(&mut self.last, &mut self.above);
+        let steps = frame.steps::<S>();
+        assert!(MARGIN + steps * S::LANES <= frame.stride);
+        let length = 3 * frame.stride;
+        let columns = self.columns[..length].as_mut_ptr();
+        let (last, above) = (self.last[..length].as_mut_ptr(), self.above[..length].as_ptr());
+        let done = frame.start(1, y.wrapping_sub(1));
+        let ring = self.ring[done..done + frame.stride].as_mut_ptr().cast::<i32>();
+        // SAFETY: as the caller's; all lanes lie inside the rows, whose lengths were just checked.
+        unsafe {
+            for c in 0..3 {
+                let from = planes.row(frame, c, y).as_ptr();
+                for step in 0..steps {
+                    let at = MARGIN + step * S::LANES;
+                    let point = self.scale.integers::<S>(c, S::load(from.add(at)));
+                    S::store_i(last.add(c * frame.stride + at), point);
+                }
+            }
+            let zero = S::splat_i(0);
+            let mut carries = [zero; 3];
+            for step in 0..steps {
+                let step = MARGIN + step * S::LANES;
+                let mut both = [zero; GROUP];
+                for c in 0..3 {
+                    let at = c * frame.stride + step;
+                    let point = S::load_i(last.add(at));
+                    let rows = S::add_i(point, S::load_i(above.add(at)));
+                    let along = S::running_sum_i(rows, &mut carries[c]);
+                    both[VERTICAL + c] = S::sub_i(along, rows);
+                    both[c] = S::load_i(columns.add(at));
+                    let strip = S::add_i(point, S::load_i(last.add(at - 1)));
+                    S::store_i(columns.add(at), S::add_i(both[c], strip));
+                }
+                S::store_by_lanes(both, ring.add(GROUP * step));
+            }
+        }
+    }
+
+    /// Notes the windows of a pair's `lanes`, which are inside the image; the others' gradients mean nothing.
+    ///
+    /// # Safety
+    /// As [`Sums::note`].
+    #[inline(always)]
+    unsafe fn note_inside<S: Groups>(
+        &self,
+        frame: &Frame,
+        pair: &Pair,
+        lanes: u32,
+        run: &mut Gradients,
+        at: usize,
+    ) {
+        let to = run.0[at..at + LANES].as_mut_ptr().cast::<f32>();
+        let pixels = self.ring.as_ptr().wrapping_add(frame.column(pair.x));
+        // SAFETY: as the caller's; sides are whole numbers that fit i32.
+        unsafe {
+            let first = pair.row[pair.x + lanes.trailing_zeros() as usize];
+            let sides = S::Pair::load(pair.row.as_ptr().add(pair.x));
+            let same = S::Pair::bits(S::Pair::eq(sides, S::Pair::splat(first)));
+            if lanes & !same == 0 && pair.is_inner(0, LANES) {
+                let side = first.to_int_unchecked::<i32>() as usize;
+                for lane in (0..LANES).step_by(S::Widest::LANES / GROUP) {
+                    let both = self.between::<S::Widest>(pixels.wrapping_add(lane), side);
+                    S::Widest::store(to.add(GROUP * lane), S::Widest::float_i(both));
+                }
+                return;
+            }
+            let mut of_lanes = [0; LANES];
+            for first in (0..LANES).step_by(GROUP) {
+                let sides = S::load(pair.row.as_ptr().add(pair.x + first));
+                let sides = S::and(S::mask(lanes >> first), sides);
+                S::store_i(of_lanes.as_mut_ptr().add(first), S::truncate_i(sides));
+            }
+            for lane in 0..LANES {
+                let both = self.between::<S>(pixels.wrapping_add(lane), of_lanes[lane] as usize);
+                S::store(to.add(GROUP * lane), S::float_i(both));
+            }
+        }
+    }
+
+    /// The gradients of one window or, in more lanes than a group has, of several side by side: of their pixel in row
+    /// 0 of the ring, the first is at `pixel`.
+    ///
+    /// # Safety
+    /// As [`Sums::note`].
+    #[inline(always)]
+    unsafe fn between<S: Simd>(&self, pixel: *const Both<i32>, side: usize) -> S::I {
+        // SAFETY: as the caller's: no window of the row aimed at is larger, and rows and columns are held.
+        unsafe {
+            let [above, below] = *self.places.get_unchecked(side);
+            let at = |corner: usize| S::load_i(pixel.wrapping_byte_add(corner).cast());
+            let difference = |left: usize| S::sub_i(at(left.wrapping_add(PIXEL * side)), at(left));
+            S::sub_i(difference(below), difference(above))
+        }
+    }
+
+    /// Notes the windows of some lanes of a pair that cross the border of the image; returns the lanes whose windows
+    /// are left to the plain form.
+    #[cold]
+    fn note_crossing(
+        &self,
+        tile: &Tile,
+        frame: &Frame,
+        pair: &Pair,
+        lanes: u32,
+        run: &mut Gradients,
+        at: usize,
+    ) -> u32 {
+        let mut plain = 0;
+        for lane in Bits(lanes) {
+            let (pixel, side) = ((pair.x + lane, pair.y), pair.row[pair.x + lane] as usize);
+            if tile.has_only_finite(pixel, side) {
+                run.0[at + lane] = self.of_mirrored(frame, tile.image, pixel, side);
+            } else {
+                plain |= 1 << lane;
+            }
+        }
+        plain
+    }
+
+    fn of_mirrored(
+        &self,
+        frame: &Frame,
+        image: &Image,
+        (x, y): (usize, usize),
+        side: usize,
+    ) -> Both<f32> {
+        let half = (side / 2) as isize;
+        let mut sums = [0_i32; GROUP];
+        for rect in image.rects((x as isize - half, y as isize - half), (side, side)) {
+            let inside = rect.inside_frame(image);
+            if inside.x.is_empty() || inside.y.is_empty() {
+                continue;
+            }
+            let at = |y: usize, x: usize| &self.ring[frame.start(1, y - 1) + frame.column(x)];
+            let row = |y: usize| (at(y, inside.x.start), at(y, inside.x.end));
+            let ((a, b), (c, d)) = (row(inside.y.start), row(inside.y.end));
+            for i in 0..GROUP {
+                let between = d[i].wrapping_sub(c[i]).wrapping_sub(b[i].wrapping_sub(a[i]));
+                sums[i] = sums[i].wrapping_add(between);
+            }
+        }
+        sums.map(|sum| sum as f32)
+    }
+}
+
+impl Sums for StripPairs {
+    type OfRun = Gradients;
+
+    const COLUMN: usize = PIXEL;
+    const CURVATURE: bool = false;
+    const LIMITED: bool = true;
+
+    fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {
+        self.ring.grow(frame.start_of(1, frame.ring))?;
+        for row in [&mut self.columns, &mut self.last, &mut self.above] {
+            row.grow(3 * frame.stride)?;
+        }
+        make_room(&mut self.places, side + 1)
+    }
+
+    fn start(&mut self, _frame: &Frame, limit: f32, side: usize, origin: [f32; 3]) {
+        self.columns.fill(0);
+        self.last.fill(0); // it is what is above the first row
+        self.scale = Scale::new(limit, side, origin);
+    }
+
+    fn size(&self) -> usize {
+        let StripPairs { ring, columns, last, above, places, .. } = self;
+        let rows = [columns, last, above].map(Buffer::size).into_iter().sum::<usize>();
+        ring.size() + rows + bytes(places)
+    }
+
+    #[inline(always)]
+    unsafe fn push<S: Groups>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
+        // SAFETY: as the caller's.
+        unsafe { self.push_row::<S::Widest>(frame, planes, y) };
+    }
+
+    fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
+        let place = |row: isize, column: isize| {
+            let pixel = frame.start(1, y.wrapping_add_signed(row)).wrapping_add_signed(column);
+            pixel.wrapping_mul(PIXEL)
+        };
+        let places = |side: usize| {
+            let half = (side / 2) as isize;
+            [place(-half - 1, -half), place(side as isize - half - 1, -half)]
+        };
+        self.places.clear();
+        self.places.push([place(0, 0); 2]);
+        self.places.extend((1..=side).map(places));
+    }
+
+    #[inline(always)]
+    unsafe fn note<S: Groups>(
+        &self,
+        tile: &Tile,
+        frame: &Frame,
+        _planes: &Planes,
+        pair: &Pair,
+        run: &mut Gradients,
+        at: usize,
+    ) -> u32 {
+        let mut inside = pair.windows;
+        if !pair.is_inner(0, LANES) {
+            inside = tile.inside(pair);
+        }
+        if inside != 0 {
+            // SAFETY: as the caller's.
+            unsafe { self.note_inside::<S>(frame, pair, inside, run, at) };
+        }
+        let crossing = pair.windows & !inside;
+        if crossing == 0 { 0 } else { self.note_crossing(tile, frame, pair, crossing, run, at) }
+    }
+
+    #[inline(always)]
+    unsafe fn estimate<S: Simd>(
+        &self,
+        run: &Gradients,
+        at: usize,
+        sides: S::F,
+        _fresh: bool,
+    ) -> Found<S> {
+        let from = run.0[at..at + S::LANES].as_ptr().cast::<f32>();
+        // SAFETY: as the caller's; so many pixels' gradients are there.
+        unsafe {
+            let gradients = |first: usize| {
+                let [x, y, z] = S::load_points(from.add(first), size_of::<Both<f32>>());
+                [Floats(x), Floats(y), Floats(z)]
+            };
+            self.scale.normals(gradients(0), gradients(VERTICAL), sides)
+        }
+    }
+}
