@@ -3,9 +3,8 @@
 
 use super::arithmetic::{Doubles, Floats, dot};
 use super::buffer::Buffer;
-use super::by_side::{self, BySide};
 use super::lanes::LANES;
-use super::planes::{Corners, Frame, MARGIN, Planes, sum_between};
+use super::planes::{Frame, MARGIN, Planes, sum_between};
 use super::run::{Noted, OfRun, RUN};
 use super::tile::{Bits, Found, Pair, Sums, Tile};
 use crate::Error;
@@ -18,19 +17,39 @@ use crate::window::Image;
 /// x, y, z, xx, xy, xz, yy, yz, zz
 const CHANNELS: usize = 9;
 
-/// The ring of integral rows: nine planes a row.
+/// Of a pixel: all moments but z, side by side, as a window's sums of them are four reads then, wherever it lies:
+/// xx, xy, xz, yy, yz, zz, x, y.
+type Most = [f64; GROUP];
+
+/// The rings of integral rows.
 #[derive(Debug, Default)]
 pub(crate) struct Moments {
-    integrals: Buffer<f64>,
-    /// The row pushed last, less the origin.
-    centered: Buffer<f64>,
+    most: Buffer<Most>,
+    z: Buffer<f64>,
     origin: [f32; 3],
     /// The place of the row pushed last; before the first the one after the ring, which is zero.
     pushed: usize,
     /// What the sums' rounding errors stay below.
     error: f64,
-    /// By the side of a window: its corners and its share.
-    places: Vec<(Corners, f64)>,
+    /// By the side of a window.
+    places: Vec<Place>,
+}
+
+/// In the rings, the left corners of a window above and below; and one over its points. A window of no side has no sum.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    above: usize,
+    below: usize,
+    share: f64,
+}
+
+/// Moments of a group's windows, lane by lane.
+#[repr(C, align(64))]
+#[derive(Default)]
+struct Lanewise {
+    most: [Most; GROUP],
+    z: [f64; GROUP],
+    share: [f64; GROUP],
 }
 
 /// The moments of windows, and one over their numbers of points.
@@ -45,13 +64,6 @@ impl<T: Copy> Clone for WindowMoments<T> {
     }
 }
 impl<T: Copy> Copy for WindowMoments<T> {}
-
-impl WindowMoments<f64> {
-    /// Of so many points.
-    fn of(sums: [f64; CHANNELS], count: f64) -> Self {
-        WindowMoments { sums, share: 1.0 / count }
-    }
-}
 
 /// The sums of points' moments about the first of them, and the number of points.
 #[cold]
@@ -87,6 +99,172 @@ const DOUBT_SUMS: f64 = 3e4;
 /// the determinant, some 1e-16, over its square turns the normal.
 const DOUBT_PLANE: f32 = 1e-5;
 
+impl Moments {
+    /// The moments of a group's windows, all of this side; `x` is its first pixel.
+    ///
+    /// # Safety
+    /// As [`Sums::note`].
+    #[inline(always)]
+    unsafe fn of_side<S: Groups>(
+        &self,
+        frame: &Frame,
+        x: usize,
+        side: usize,
+    ) -> WindowMoments<Doubles<S>> {
+        let column = frame.column(x);
+        let place @ Place { above, below, share } = self.places[side];
+        // SAFETY: as the caller's: rows and columns are held, and so is the group from this column on.
+        unsafe {
+            let mut rows = [S::splat_d(0.0); GROUP];
+            for lane in 0..GROUP {
+                rows[lane] = self.most_between::<S>(column + lane, &place, side);
+            }
+            let corners = [above, above.wrapping_add(side), below, below.wrapping_add(side)];
+            let z = sum_between(self.z.as_ptr().wrapping_add(column), &corners);
+            WindowMoments::of_rows(rows, z, Doubles::splat(share))
+        }
+    }
+
+    /// The moments of the windows of some lanes of a pair, of the group that begins with lane `first`.
+    ///
+    /// # Safety
+    /// As [`Sums::note`].
+    #[inline(always)]
+    unsafe fn of_lanes<S: Groups>(
+        &self,
+        frame: &Frame,
+        pair: &Pair,
+        first: usize,
+        lanes: u32,
+    ) -> Lanewise {
+        let column = frame.column(pair.x + first);
+        let mut moments = Lanewise::default();
+        // SAFETY: as the caller's: no window of the row aimed at is larger, and rows and columns are held.
+        unsafe {
+            let sides = pair.sides::<S>(first, lanes);
+            for lane in 0..GROUP {
+                let (column, side) = (column + lane, sides[lane] as usize);
+                let place = self.places.get_unchecked(side);
+                let most = self.most_between::<S>(column, place, side);
+                S::store_d(moments.most[lane].as_mut_ptr(), most);
+                let z = self.z.as_ptr().wrapping_add(column);
+                let difference =
+                    |left: usize| *z.wrapping_add(left.wrapping_add(side)) - *z.wrapping_add(left);
+                moments.z[lane] = difference(place.below) - difference(place.above);
+                moments.share[lane] = place.share;
+            }
+        }
+        moments
+    }
+
+    /// The sums of most moments of the window of the pixel in this column.
+    ///
+    /// # Safety
+    /// As [`Sums::note`].
+    #[inline(always)]
+    unsafe fn most_between<S: Groups>(&self, column: usize, place: &Place, side: usize) -> S::D {
+        let pixel = self.most.as_ptr().wrapping_add(column);
+        // SAFETY: as the caller's.
+        unsafe {
+            let at = |corner: usize| S::load_d(pixel.wrapping_add(corner).cast());
+            let difference = |left: usize| S::sub_d(at(left.wrapping_add(side)), at(left));
+            S::sub_d(difference(place.below), difference(place.above))
+        }
+    }
+
+    /// Puts the moments of windows that cross the border of the image, of some lanes of a pair's group that begins with
+    /// lane `first`; returns those that are left to the plain form.
+    #[cold]
+    fn put_crossing(
+        &self,
+        tile: &Tile,
+        frame: &Frame,
+        pair: &Pair,
+        first: usize,
+        lanes: u32,
+        moments: &mut Lanewise,
+    ) -> u32 {
+        let mut plain = 0;
+        for lane in Bits(lanes) {
+            let (pixel, side) = pair.window(first + lane);
+            if tile.has_only_finite(pixel, side) {
+                let of_lane = (&mut moments.most[lane], &mut moments.z[lane]);
+                let points = self.sum_mirrored(frame, tile.image, pixel, side, of_lane);
+                moments.share[lane] = 1.0 / points;
+            } else {
+                plain |= 1 << lane;
+            }
+        }
+        plain
+    }
+
+    /// The moments of a window that is mirrored at the border; returns how many points it has.
+    fn sum_mirrored(
+        &self,
+        frame: &Frame,
+        image: &Image,
+        (x, y): (usize, usize),
+        side: usize,
+        (most, z): (&mut Most, &mut f64),
+    ) -> f64 {
+        let half = (side / 2) as isize;
+        (*most, *z) = ([0.0; GROUP], 0.0);
+        let mut count = 0;
+        for rect in image.rects((x as isize - half, y as isize - half), (side, side)) {
+            if rect.x.is_empty() || rect.y.is_empty() {
+                continue;
+            }
+            count += rect.x.len() * rect.y.len();
+            for (sign, end_row) in [(1.0, rect.y.end), (-1.0, rect.y.start)] {
+                if end_row == 0 {
+                    continue;
+                }
+                let row = frame.start(1, end_row - 1);
+                let [left, right] = [rect.x.start, rect.x.end].map(|x| row + frame.column(x) - 1);
+                for c in 0..GROUP {
+                    most[c] += sign * (self.most[right][c] - self.most[left][c]);
+                }
+                *z += sign * (self.z[right] - self.z[left]);
+            }
+        }
+        count as f64
+    }
+}
+
+impl Lanewise {
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn load<S: Groups>(&self) -> WindowMoments<Doubles<S>> {
+        // SAFETY: as the caller's; there are whole groups.
+        unsafe {
+            let mut rows = [S::splat_d(0.0); GROUP];
+            for lane in 0..GROUP {
+                rows[lane] = S::load_d(self.most[lane].as_ptr());
+            }
+            let [z, share] = [&self.z, &self.share].map(|from| Doubles(S::load_d(from.as_ptr())));
+            WindowMoments::of_rows(rows, z, share)
+        }
+    }
+}
+
+impl<S: Groups> WindowMoments<Doubles<S>> {
+    /// From most moments, window by window, and z.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn of_rows(rows: [S::D; GROUP], z: Doubles<S>, share: Doubles<S>) -> Self {
+        // SAFETY: as the caller's.
+        let [xx, xy, xz, yy, yz, zz, x, y] = unsafe { S::transpose_d(rows) };
+        let doubles = |lanes| Doubles(lanes);
+        let (x, y) = (doubles(x), doubles(y));
+        let (xx, xy, xz) = (doubles(xx), doubles(xy), doubles(xz));
+        let (yy, yz, zz) = (doubles(yy), doubles(yz), doubles(zz));
+        WindowMoments { sums: [x, y, z, xx, xy, xz, yy, yz, zz], share }
+    }
+}
+
 impl Sums for Moments {
     type OfRun = Matrices;
 
@@ -95,61 +273,84 @@ impl Sums for Moments {
     const LIMITED: bool = false;
 
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {
-        frame.reserve_ring(CHANNELS, &mut self.integrals)?;
-        self.centered.grow(3 * frame.stride)?;
+        frame.reserve_ring(1, &mut self.most)?;
+        frame.reserve_ring(1, &mut self.z)?;
         make_room(&mut self.places, side + 1)
     }
 
     fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, origin: [f32; 3]) {
-        self.pushed = frame.start_ring(CHANNELS, &mut self.integrals);
+        frame.start_ring(1, &mut self.most);
+        self.pushed = frame.start_ring(1, &mut self.z);
         self.origin = origin;
     }
 
     fn size(&self) -> usize {
-        self.integrals.size() + self.centered.size() + bytes(&self.places)
+        self.most.size() + self.z.size() + bytes(&self.places)
     }
 
     #[inline(always)]
     unsafe fn push<S: Groups>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
         let place = frame.place(y);
         let groups = frame.steps::<S>();
-        let (stride, plane) = (frame.stride, 3 * frame.stride);
-        assert!(MARGIN + groups * GROUP <= stride && plane <= self.centered.len());
-        assert!(frame.start_of(CHANNELS, frame.ring + 1) <= self.integrals.len());
-        let from = planes.rows(frame, y);
-        let centered = self.centered.as_mut_ptr();
-        let above = self.integrals.as_ptr().wrapping_add(frame.start_of(CHANNELS, self.pushed));
-        let row = self.integrals.as_mut_ptr().wrapping_add(frame.start_of(CHANNELS, place));
-        // SAFETY: as the caller's; the groups lie inside the planes and rows, whose lengths were just checked.
+        assert!(MARGIN + groups * GROUP <= frame.stride);
+        let rows = frame.start_of(1, frame.ring + 1);
+        let (most, z) = (self.most[..rows].as_mut_ptr(), self.z[..rows].as_mut_ptr());
+        let (above, own) = (frame.start_of(1, self.pushed), frame.start_of(1, place));
+        let planes = planes.rows(frame, y);
+        // SAFETY: as the caller's; the groups lie inside the planes and the rings' rows, as was just checked.
         unsafe {
-            for c in 0..3 {
-                let origin = Floats::<S>::splat(self.origin[c]).widen();
-                for group in 0..groups {
-                    let at = MARGIN + group * GROUP;
-                    let coordinate = Floats::<S>::load(from[c].as_ptr().add(at)).widen();
-                    S::store_d(centered.add(c * stride + at), (coordinate - origin).0);
+            most.add(own + MARGIN - 1).write([0.0; GROUP]);
+            z.add(own + MARGIN - 1).write(0.0);
+            let mut most_carry = S::splat_d(0.0);
+            let mut z_carry = S::splat_d(0.0);
+            for group in 0..groups {
+                let at = MARGIN + group * GROUP;
+                let mut point = [S::splat_d(0.0); 3];
+                for c in 0..3 {
+                    let origin = S::widen(S::splat(self.origin[c]));
+                    point[c] = S::sub_d(S::widen(S::load(planes[c].as_ptr().add(at))), origin);
                 }
+                let [px, py, pz] = point;
+                let pixels = S::transpose_d([
+                    S::mul_d(px, px),
+                    S::mul_d(px, py),
+                    S::mul_d(px, pz),
+                    S::mul_d(py, py),
+                    S::mul_d(py, pz),
+                    S::mul_d(pz, pz),
+                    px,
+                    py,
+                ]);
+                // What a pixel waits for is one addition a group: that to the carry.
+                let mut along = S::splat_d(0.0);
+                for lane in 0..GROUP {
+                    along = if lane == 0 { pixels[0] } else { S::add_d(along, pixels[lane]) };
+                    let from = most.add(above + at + lane).cast();
+                    let sum = S::add_d(S::add_d(along, most_carry), S::load_d(from));
+                    S::store_d(most.add(own + at + lane).cast(), sum);
+                }
+                most_carry = S::add_d(along, most_carry);
+                let along = S::running_sum_d(pz, &mut z_carry);
+                S::store_d(z.add(own + at), S::add_d(along, S::load_d(z.add(above + at))));
             }
-            let [x, y, z] = [0, 1, 2].map(|c| centered.wrapping_add(c * stride).cast_const());
-            let planes = |first: usize| [0, 1, 2].map(|c| (first + c) * stride);
-            integrate::<S, 1>([[x], [y], [z]], above, row, planes(0), groups);
-            integrate::<S, 2>([[x, x], [x, y], [x, z]], above, row, planes(3), groups);
-            integrate::<S, 2>([[y, y], [y, z], [z, z]], above, row, planes(6), groups);
         }
         self.pushed = place;
-        let end = frame.start_of(CHANNELS, place) + MARGIN + groups * GROUP - 1;
-        let square = |c: usize| self.integrals[end + c * stride];
-        self.error = ROUNDING * (square(3) + square(6) + square(8));
+        let [xx, _, _, yy, _, zz, ..] = self.most[own + MARGIN + groups * GROUP - 1];
+        self.error = ROUNDING * (xx + yy + zz);
     }
 
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
         let place = |side: usize| {
             let before = -((side / 2) as isize) - 1;
-            let ends = [before, before + side as isize];
-            (frame.corners(CHANNELS, y, ends, ends), 1.0 / (side * side) as f64)
+            let row = |row: isize| frame.start(1, y.wrapping_add_signed(row));
+            let [above, below] =
+                [before, before + side as isize].map(|at| row(at).wrapping_add_signed(before));
+            Place { above, below, share: 1.0 / (side * side) as f64 }
         };
+        let own = frame.start(1, y);
         self.places.clear();
-        self.places.extend((0..=side).map(place));
+        self.places.push(Place { above: own, below: own, share: 0.0 });
+        self.places.extend((1..=side).map(place));
     }
 
     #[inline(always)]
@@ -157,13 +358,37 @@ impl Sums for Moments {
         &self,
         tile: &Tile,
         frame: &Frame,
-        planes: &Planes,
+        _planes: &Planes,
         pair: &Pair,
-        run: &mut Self::OfRun,
+        run: &mut Matrices,
         at: usize,
     ) -> u32 {
-        // SAFETY: as the caller's.
-        unsafe { by_side::note::<S, Self>(self, tile, frame, planes, pair, run, at) }
+        let all_inside = tile.inside(pair);
+        let mut plain = 0;
+        for first in (0..LANES).step_by(GROUP) {
+            let [lanes, inside] =
+                [pair.windows, all_inside].map(|lanes| lanes >> first & ((1 << GROUP) - 1));
+            if lanes == 0 {
+                continue;
+            }
+            // SAFETY: as the caller's.
+            unsafe {
+                let moments = if let Some(side) = pair.one_side::<S>(first, lanes) {
+                    self.of_side::<S>(frame, pair.x + first, side)
+                } else {
+                    let mut moments = self.of_lanes::<S>(frame, pair, first, inside);
+                    let crossing = lanes & !inside;
+                    if crossing != 0 {
+                        let left =
+                            self.put_crossing(tile, frame, pair, first, crossing, &mut moments);
+                        plain |= left << first;
+                    }
+                    moments.load::<S>()
+                };
+                run.note(&moments, at + first);
+            }
+        }
+        plain
     }
 
     #[inline(always)]
@@ -197,111 +422,6 @@ impl Sums for Moments {
     ) -> Found<S> {
         // SAFETY: as the caller's.
         unsafe { run.normals(at, if fresh { 0.0 } else { self.error }) }
-    }
-}
-
-impl BySide for Moments {
-    type OfLanes<S: Simd> = WindowMoments<Doubles<S>>;
-    type Of1 = WindowMoments<f64>;
-
-    const PAIRS: bool = false;
-
-    #[inline(always)]
-    unsafe fn of_pixels<S: Simd>(
-        &self,
-        frame: &Frame,
-        _planes: &Planes,
-        x: usize,
-        side: usize,
-    ) -> Self::OfLanes<S> {
-        let (corners, share) = &self.places[side];
-        let x = frame.column(x);
-        // SAFETY: as the caller's: rows and columns are held, and so are the groups from these columns on.
-        unsafe {
-            let mut sums = [Doubles::splat(0.0); CHANNELS];
-            for c in 0..CHANNELS {
-                let plane = self.integrals.as_ptr().add(x + c * frame.stride);
-                sums[c] = sum_between(plane, corners);
-            }
-            WindowMoments { sums, share: Doubles::splat(*share) }
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn select<S: Simd>(
-        lanes: u32,
-        yes: Self::OfLanes<S>,
-        no: Self::OfLanes<S>,
-    ) -> Self::OfLanes<S> {
-        let mut moments = no;
-        // SAFETY: as the caller's.
-        unsafe {
-            for c in 0..CHANNELS {
-                let sum = S::select_bits_d(lanes, yes.sums[c].0, no.sums[c].0);
-                moments.sums[c] = Doubles(sum);
-            }
-            moments.share = Doubles(S::select_bits_d(lanes, yes.share.0, no.share.0));
-        }
-        moments
-    }
-
-    #[inline(always)]
-    unsafe fn none<S: Simd>() -> Self::OfLanes<S> {
-        // SAFETY: as the caller's.
-        let zero = unsafe { Doubles::splat(0.0) };
-        WindowMoments { sums: [zero; CHANNELS], share: zero }
-    }
-
-    fn of_mirrored(
-        &self,
-        frame: &Frame,
-        _planes: &Planes,
-        image: &Image,
-        (x, y): (usize, usize),
-        side: usize,
-    ) -> Option<Self::Of1> {
-        let half = (side / 2) as isize;
-        let (mut sums, mut count) = ([0.0; CHANNELS], 0.0);
-        for rect in image.rects((x as isize - half, y as isize - half), (side, side)) {
-            if rect.x.is_empty() || rect.y.is_empty() {
-                continue;
-            }
-            count += (rect.x.len() * rect.y.len()) as f64;
-            for (c, sum) in sums.iter_mut().enumerate() {
-                let segment = |end_row: usize| {
-                    if end_row == 0 {
-                        return 0.0;
-                    }
-                    let row = frame.start(CHANNELS, end_row - 1) + c * frame.stride;
-                    self.integrals[row + frame.column(rect.x.end) - 1]
-                        - self.integrals[row + frame.column(rect.x.start) - 1]
-                };
-                *sum += segment(rect.y.end) - segment(rect.y.start);
-            }
-        }
-        Some(WindowMoments::of(sums, count))
-    }
-
-    #[inline(always)]
-    unsafe fn put<S: Simd>(moments: &mut Self::OfLanes<S>, lane: usize, one: Self::Of1) {
-        // SAFETY: as the caller's.
-        unsafe {
-            for (to, one) in moments.sums.iter_mut().zip(one.sums) {
-                *to = Doubles(S::select_bits_d(1 << lane, S::splat_d(one), to.0));
-            }
-            let share = S::splat_d(one.share);
-            moments.share = Doubles(S::select_bits_d(1 << lane, share, moments.share.0));
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn note_lanes<S: Simd>(
-        moments: WindowMoments<Doubles<S>>,
-        run: &mut Matrices,
-        at: usize,
-    ) {
-        // SAFETY: as the caller's.
-        unsafe { run.note(&moments, at) }
     }
 }
 
@@ -496,39 +616,5 @@ unsafe fn least_root<S: Simd>([c0, c1, c2]: [Floats<S>; 3]) -> Floats<S> {
         let [first, others @ ..] = COSINES;
         let cosine = others.into_iter().fold(splat(first), |sum, c| sum * sine + splat(c));
         (c2 - splat(2.0) * radius * cosine) * splat(1.0 / 3.0)
-    }
-}
-
-/// Three planes of an integral row (Eq. 2) of the products of `FACTORS` rows each: sums along three rows at a time,
-/// as each addition waits for the one before.
-///
-/// # Safety
-/// The processor has the instruction set of `S`; the groups are inside the rows, and in the planes after the margin.
-#[inline(always)]
-unsafe fn integrate<S: Groups, const FACTORS: usize>(
-    factors: [[*const f64; FACTORS]; 3],
-    above: *const f64,
-    row: *mut f64,
-    planes: [usize; 3],
-    groups: usize,
-) {
-    // SAFETY: as the caller's.
-    unsafe {
-        for plane in planes {
-            row.add(plane + MARGIN - 1).write(0.0);
-        }
-        let mut carries = [S::splat_d(0.0); 3];
-        for group in 0..groups {
-            let at = MARGIN + group * GROUP;
-            for c in 0..3 {
-                let mut product = S::load_d(factors[c][0].add(at));
-                if FACTORS == 2 {
-                    product = S::mul_d(product, S::load_d(factors[c][1].add(at)));
-                }
-                let along = S::running_sum_d(product, &mut carries[c]);
-                let sum = S::add_d(along, S::load_d(above.add(planes[c] + at)));
-                S::store_d(row.add(planes[c] + at), sum);
-            }
-        }
     }
 }

@@ -113,28 +113,21 @@ impl StripPairs {
     ) {
         let to = run.0[at..at + LANES].as_mut_ptr().cast::<f32>();
         let pixels = self.ring.as_ptr().wrapping_add(frame.column(pair.x));
-        // SAFETY: as the caller's; sides are whole numbers that fit i32.
+        // SAFETY: as the caller's.
         unsafe {
-            let first = pair.row[pair.x + lanes.trailing_zeros() as usize];
-            let sides = S::Pair::load(pair.row.as_ptr().add(pair.x));
-            let same = S::Pair::bits(S::Pair::eq(sides, S::Pair::splat(first)));
-            if lanes & !same == 0 && pair.is_inner(0, LANES) {
-                let side = first.to_int_unchecked::<i32>() as usize;
+            if let Some(side) = pair.one_side::<S::Pair>(0, lanes) {
                 for lane in (0..LANES).step_by(S::Widest::LANES / GROUP) {
                     let both = self.between::<S::Widest>(pixels.wrapping_add(lane), side);
                     S::Widest::store(to.add(GROUP * lane), S::Widest::float_i(both));
                 }
                 return;
             }
-            let mut of_lanes = [0; LANES];
             for first in (0..LANES).step_by(GROUP) {
-                let sides = S::load(pair.row.as_ptr().add(pair.x + first));
-                let sides = S::and(S::mask(lanes >> first), sides);
-                S::store_i(of_lanes.as_mut_ptr().add(first), S::truncate_i(sides));
-            }
-            for lane in 0..LANES {
-                let both = self.between::<S>(pixels.wrapping_add(lane), of_lanes[lane] as usize);
-                S::store(to.add(GROUP * lane), S::float_i(both));
+                let sides = pair.sides::<S>(first, lanes >> first);
+                for (lane, side) in (first..).zip(sides) {
+                    let both = self.between::<S>(pixels.wrapping_add(lane), side as usize);
+                    S::store(to.add(GROUP * lane), S::float_i(both));
+                }
             }
         }
     }
@@ -169,7 +162,7 @@ impl StripPairs {
     ) -> u32 {
         let mut plain = 0;
         for lane in Bits(lanes) {
-            let (pixel, side) = ((pair.x + lane, pair.y), pair.row[pair.x + lane] as usize);
+            let (pixel, side) = pair.window(lane);
             if tile.has_only_finite(pixel, side) {
                 run.0[at + lane] = self.of_mirrored(frame, tile.image, pixel, side);
             } else {
@@ -262,10 +255,7 @@ impl Sums for StripPairs {
         run: &mut Gradients,
         at: usize,
     ) -> u32 {
-        let mut inside = pair.windows;
-        if !pair.is_inner(0, LANES) {
-            inside = tile.inside(pair);
-        }
+        let inside = tile.inside(pair);
         if inside != 0 {
             // SAFETY: as the caller's.
             unsafe { self.note_inside::<S>(frame, pair, inside, run, at) };

@@ -462,8 +462,13 @@ impl Tile<'_> {
     }
 
     /// The lanes of a pair whose windows, and the pixels around them, are inside the image.
-    #[cold]
+    #[inline(always)]
     pub fn inside(&self, pair: &Pair) -> u32 {
+        if pair.is_inner(0, LANES) { pair.windows } else { self.inside_at_border(pair) }
+    }
+
+    #[cold]
+    fn inside_at_border(&self, pair: &Pair) -> u32 {
         let is_inside = |lane: &usize| {
             let x = pair.x + lane;
             self.inner(pair.row[x] as usize, pair.y).contains(&x)
@@ -546,6 +551,44 @@ impl<'a> Pair<'a> {
         // SAFETY: as the caller's.
         let windows = unsafe { S::Pair::bits(S::Pair::lt(S::Pair::splat(0.0), sides)) };
         Pair { x, y, row, windows: windows & ((1 << count) - 1), inner }
+    }
+
+    /// A lane's pixel and the side of its window.
+    pub fn window(&self, lane: usize) -> ((usize, usize), usize) {
+        let x = self.x + lane;
+        ((x, self.y), self.row[x] as usize)
+    }
+
+    /// The side of the windows of `lanes`, of those of `S` that begin with lane `first`, if they have the same and
+    /// windows of any of the tile's sides are inside the image there.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn one_side<S: Simd>(&self, first: usize, lanes: u32) -> Option<usize> {
+        let x = self.x + first;
+        let side = self.row[x + lanes.trailing_zeros() as usize];
+        // SAFETY: as the caller's; sides are whole numbers that fit i32.
+        unsafe {
+            let same = S::bits(S::eq(S::load(self.row.as_ptr().add(x)), S::splat(side)));
+            let have_one = lanes & !same == 0 && self.is_inner(first, S::LANES);
+            have_one.then(|| side.to_int_unchecked::<i32>() as usize)
+        }
+    }
+
+    /// The sides of the windows of `lanes`, of the group that begins with lane `first`; 0 in the others.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn sides<S: Groups>(&self, first: usize, lanes: u32) -> [i32; GROUP] {
+        let mut sides = [0; GROUP];
+        // SAFETY: as the caller's; sides are whole numbers that fit i32.
+        unsafe {
+            let row = S::load(self.row.as_ptr().add(self.x + first));
+            S::store_i(sides.as_mut_ptr(), S::truncate_i(S::and(S::mask(lanes), row)));
+        }
+        sides
     }
 
     /// Whether windows of any of the tile's sides are inside the image for so many pixels from a lane on.

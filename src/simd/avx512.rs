@@ -134,6 +134,10 @@ impl Groups for Avx512 {
         }
     }
     #[inline(always)]
+    unsafe fn join_halves_d(a: Self::D, b: Self::D) -> [Self::D; 2] {
+        unsafe { [_mm512_shuffle_f64x2::<0x44>(a, b), _mm512_shuffle_f64x2::<0xee>(a, b)] }
+    }
+    #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
         unsafe {
             // Among lanes 0 to 3 and 4 to 7 each gets the one before, then the one two before.

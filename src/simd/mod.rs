@@ -195,6 +195,24 @@ pub(crate) trait Groups: Along {
     /// As [`Along::transpose_fours`].
     unsafe fn transpose_fours_d(rows: [Self::D; 4]) -> [Self::D; 4];
 
+    /// The lower halves of both, and the upper halves.
+    unsafe fn join_halves_d(a: Self::D, b: Self::D) -> [Self::D; 2];
+
+    /// Lane i of row j becomes lane j of row i.
+    #[inline(always)]
+    unsafe fn transpose_d([a, b, c, d, e, f, g, h]: [Self::D; 8]) -> [Self::D; 8] {
+        // SAFETY: as the caller's.
+        unsafe {
+            let first = Self::transpose_fours_d([a, b, c, d]);
+            let second = Self::transpose_fours_d([e, f, g, h]);
+            let [a, e] = Self::join_halves_d(first[0], second[0]);
+            let [b, f] = Self::join_halves_d(first[1], second[1]);
+            let [c, g] = Self::join_halves_d(first[2], second[2]);
+            let [d, h] = Self::join_halves_d(first[3], second[3]);
+            [a, b, c, d, e, f, g, h]
+        }
+    }
+
     /// As [`Along::prefix_sum_i`].
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D;
     /// As [`Along::last_i`].

@@ -385,6 +385,10 @@ impl Groups for Neon {
         columns
     }
     #[inline(always)]
+    unsafe fn join_halves_d(a: Self::D, b: Self::D) -> [Self::D; 2] {
+        [[a[0], a[1], b[0], b[1]], [a[2], a[3], b[2], b[3]]]
+    }
+    #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
         /// Four lanes: each gets the one before, then the one two before.
         #[inline(always)]

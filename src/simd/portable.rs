@@ -290,6 +290,11 @@ impl Groups for Portable {
         transpose_fours(rows)
     }
     #[inline(always)]
+    unsafe fn join_halves_d(a: D, b: D) -> [D; 2] {
+        let half = |first: usize| std::array::from_fn(|l| [a, b][l / 4][first + l % 4]);
+        [half(0), half(4)]
+    }
+    #[inline(always)]
     unsafe fn prefix_sum_d(a: D) -> D {
         prefix_sum(a, |a, b| a + b)
     }

@@ -155,6 +155,8 @@ unsafe fn of_groups<S: Groups>(a: &[f32; 16], b: &[f32; 16]) -> Results {
             S::last_d(dx),
         ]);
         results.doubles::<S>(S::transpose_fours_d([dx, dy, S::add_d(dx, dx), S::add_d(dy, dy)]));
+        let rows = [0, 1, 2, 3, 4, 5, 6, 7].map(|row| S::load_d(doubles.as_ptr().add(row)));
+        results.doubles::<S>(S::transpose_d(rows));
     }
     results
 }

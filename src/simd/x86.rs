@@ -320,6 +320,10 @@ impl Groups for Sse2 {
         columns
     }
     #[inline(always)]
+    unsafe fn join_halves_d(a: Self::D, b: Self::D) -> [Self::D; 2] {
+        [[a[0], a[1], b[0], b[1]], [a[2], a[3], b[2], b[3]]]
+    }
+    #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
         /// Four lanes: each gets the one before, then the one two before.
         #[inline(always)]
@@ -611,6 +615,10 @@ impl Groups for Avx2 {
             }
         }
         columns
+    }
+    #[inline(always)]
+    unsafe fn join_halves_d(a: Self::D, b: Self::D) -> [Self::D; 2] {
+        [[a[0], b[0]], [a[1], b[1]]]
     }
     #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
