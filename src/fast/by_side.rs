@@ -1,5 +1,7 @@
 //! Windows of one size for all pixels of a group at once: as many times as a group has sizes.
 
+use std::marker::PhantomData;
+
 use super::planes::{Frame, Planes};
 use super::tile::{Pair, Sums, Tile, contains};
 use crate::simd::{GROUP, Groups, Simd};
@@ -14,6 +16,9 @@ pub(crate) trait BySide: Sums {
 
     /// Whether pairs of groups are summed as such: not where a group's sums fill the registers.
     const PAIRS: bool;
+
+    /// Whether a window of an odd side has the sums of the next smaller one's.
+    const EVEN: bool;
 
     /// The sums of the windows of `side` x `side` around the pixels from `x` on, one in each lane, of the row aimed
     /// at. The windows, and the pixels around them, lie inside the image and hold finite points only.
@@ -84,7 +89,7 @@ pub(crate) unsafe fn note<S: Groups, M: BySide>(
 ) -> u32 {
     // SAFETY: as the caller's; the frame holds the largest side around every pixel of the tile.
     unsafe {
-        let [first, second] = [Group::<S>::new(pair, 0), Group::new(pair, GROUP)];
+        let [first, second] = [Group::<S, M>::new(pair, 0), Group::new(pair, GROUP)];
         if let (Some(side), Some(other)) = (first.one_side(), second.one_side())
             && side == other
         {
@@ -108,20 +113,21 @@ pub(crate) unsafe fn note<S: Groups, M: BySide>(
 }
 
 /// Eight pixels of a row and their windows.
-struct Group<'a, S: Groups> {
+struct Group<'a, S: Groups, M> {
     /// The first pixel.
     x: usize,
     y: usize,
-    /// The row's sides of windows, and the eight pixels'.
+    /// The row's sides of windows, and those that the eight pixels' sums are of.
     row: &'a [f32],
     sides: S::F,
     /// The lanes that have a window.
     windows: u32,
     /// Whether windows of any of the tile's sides are inside the image here.
     inner: bool,
+    method: PhantomData<M>,
 }
 
-impl<'a, S: Groups> Group<'a, S> {
+impl<'a, S: Groups, M: BySide> Group<'a, S, M> {
     /// The group of a pair that begins with `lane`.
     ///
     /// # Safety
@@ -131,8 +137,15 @@ impl<'a, S: Groups> Group<'a, S> {
         let (x, y, row) = (pair.x + lane, pair.y, pair.row);
         let windows = pair.windows >> lane & ((1 << GROUP) - 1);
         // SAFETY: as the caller's.
-        let sides = unsafe { S::load(row.as_ptr().add(x)) };
-        Group { x, y, row, sides, windows, inner: pair.is_inner(lane, GROUP) }
+        unsafe {
+            let mut sides = S::load(row.as_ptr().add(x));
+            if M::EVEN {
+                let halves = S::truncate(S::mul(sides, S::splat(0.5)));
+                sides = S::add(halves, halves);
+            }
+            let inner = pair.is_inner(lane, GROUP);
+            Group { x, y, row, sides, windows, inner, method: PhantomData }
+        }
     }
 
     /// The side of all its windows, if they have the same and are inside the image.
@@ -149,17 +162,22 @@ impl<'a, S: Groups> Group<'a, S> {
         (same == self.windows).then_some(side)
     }
 
-    /// The first of the lanes `todo` and those with windows of the same side; and that side.
+    /// The first of the lanes `todo` and those with sums over windows of the same side; and that side.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn next_windows(&self, todo: u32) -> (u32, usize) {
-        let side = self.row[self.x + todo.trailing_zeros() as usize];
+        let mut side = self.row[self.x + todo.trailing_zeros() as usize];
         // SAFETY: as the caller's; sides are whole numbers that fit i32.
         unsafe {
+            let mut whole = side.to_int_unchecked::<i32>();
+            if M::EVEN {
+                whole &= !1;
+                side = whole as f32;
+            }
             let same = S::bits(S::eq(self.sides, S::splat(side))) & todo;
-            (same, side.to_int_unchecked::<i32>() as usize)
+            (same, whole as usize)
         }
     }
 
@@ -168,7 +186,7 @@ impl<'a, S: Groups> Group<'a, S> {
     /// # Safety
     /// As [`note`].
     #[inline(always)]
-    unsafe fn sum_up<M: BySide>(
+    unsafe fn sum_up(
         &self,
         sums: &M,
         tile: &Tile,
@@ -221,7 +239,7 @@ impl<'a, S: Groups> Group<'a, S> {
     /// As [`note`].
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    unsafe fn put_crossing<M: BySide>(
+    unsafe fn put_crossing(
         &self,
         sums: &M,
         tile: &Tile,

@@ -179,6 +179,7 @@ impl BySide for HalfWindows {
     type Of1 = Tangents<f32>;
 
     const PAIRS: bool = true;
+    const EVEN: bool = true;
 
     #[inline(always)]
     unsafe fn of_pixels<S: Simd>(

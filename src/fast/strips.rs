@@ -149,6 +149,7 @@ impl BySide for Strips {
     type Of1 = Infallible;
 
     const PAIRS: bool = true;
+    const EVEN: bool = false;
 
     #[inline(always)]
     unsafe fn of_pixels<S: Simd>(
