@@ -249,7 +249,7 @@ impl<'a, S: Groups, M: BySide> Group<'a, S, M> {
         side: usize,
         of8: &mut M::OfLanes<S>,
     ) -> u32 {
-        let ones = crossing(sums, tile, frame, planes, (self.x, self.y), lanes, side);
+        let ones = self.crossing(sums, tile, frame, planes, lanes, side);
         let mut plain = lanes;
         for (lane, one) in ones.into_iter().enumerate() {
             if let Some(one) = one {
@@ -260,26 +260,26 @@ impl<'a, S: Groups, M: BySide> Group<'a, S, M> {
         }
         plain
     }
-}
 
-/// The sums of windows that cross the border of the image, but of those that are left to the plain form. `pixel`
-/// is the group's first one.
-// No instructions of `S` in here: they would not be inlined into a function of its own.
-#[cold]
-fn crossing<M: BySide>(
-    sums: &M,
-    tile: &Tile,
-    frame: &Frame,
-    planes: &Planes,
-    pixel: (usize, usize),
-    lanes: u32,
-    side: usize,
-) -> [Option<M::Of1>; GROUP] {
-    std::array::from_fn(|lane| {
-        let pixel = (pixel.0 + lane, pixel.1);
-        if lanes >> lane & 1 == 0 || !tile.has_only_finite(pixel, side) {
-            return None;
-        }
-        sums.of_mirrored(frame, planes, tile.image, pixel, side)
-    })
+    /// The sums of windows that cross the border of the image, but of those that are left to the plain form.
+    // No instructions of `S` in here: they would not be inlined into a function of its own.
+    #[cold]
+    fn crossing(
+        &self,
+        sums: &M,
+        tile: &Tile,
+        frame: &Frame,
+        planes: &Planes,
+        lanes: u32,
+        side: usize,
+    ) -> [Option<M::Of1>; GROUP] {
+        std::array::from_fn(|lane| {
+            let pixel = (self.x + lane, self.y);
+            // By the window's own side: whether it fits the image depends on that.
+            if lanes >> lane & 1 == 0 || !tile.has_only_finite(pixel, self.row[pixel.0] as usize) {
+                return None;
+            }
+            sums.of_mirrored(frame, planes, tile.image, pixel, side)
+        })
+    }
 }
