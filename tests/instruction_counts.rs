@@ -30,12 +30,12 @@ use Semantics::{Paper, Pcl};
 
 /// Instructions a pixel at most: with AVX2, with SSE2. The paper has no border policies.
 const BOUNDS: [(Semantics, Method, BorderPolicy, u64, u64); 10] = [
-    (Pcl, CovarianceMatrix, Ignore, 209, 436),
-    (Pcl, CovarianceMatrix, Mirror, 273, 516),
+    (Pcl, CovarianceMatrix, Ignore, 194, 391),
+    (Pcl, CovarianceMatrix, Mirror, 235, 441),
     (Pcl, Average3DGradient, Ignore, 105, 189),
-    (Pcl, Average3DGradient, Mirror, 145, 235),
-    (Pcl, AverageDepthChange, Ignore, 112, 199),
-    (Pcl, AverageDepthChange, Mirror, 205, 297),
+    (Pcl, Average3DGradient, Mirror, 137, 228),
+    (Pcl, AverageDepthChange, Ignore, 110, 196),
+    (Pcl, AverageDepthChange, Mirror, 204, 296),
     (Pcl, Simple3DGradient, Ignore, 104, 184),
     (Paper, CovarianceMatrix, Ignore, 265, 486),
     (Paper, Average3DGradient, Ignore, 235, 348),
