@@ -53,17 +53,10 @@ struct Lanewise {
 }
 
 /// The moments of windows, and one over their numbers of points.
-pub(crate) struct WindowMoments<T> {
-    pub sums: [T; CHANNELS],
-    pub share: T,
+pub(crate) struct WindowMoments<S: Simd> {
+    pub sums: [Doubles<S>; CHANNELS],
+    pub share: Doubles<S>,
 }
-
-impl<T: Copy> Clone for WindowMoments<T> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-impl<T: Copy> Copy for WindowMoments<T> {}
 
 /// The sums of points' moments about the first of them, and the number of points.
 #[cold]
@@ -105,12 +98,7 @@ impl Moments {
     /// # Safety
     /// As [`Sums::note`].
     #[inline(always)]
-    unsafe fn of_side<S: Groups>(
-        &self,
-        frame: &Frame,
-        x: usize,
-        side: usize,
-    ) -> WindowMoments<Doubles<S>> {
+    unsafe fn of_side<S: Groups>(&self, frame: &Frame, x: usize, side: usize) -> WindowMoments<S> {
         let column = frame.column(x);
         let place @ Place { above, below, share } = self.places[side];
         // SAFETY: as the caller's: rows and columns are held, and so is the group from this column on.
@@ -235,7 +223,7 @@ impl Lanewise {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn load<S: Groups>(&self) -> WindowMoments<Doubles<S>> {
+    unsafe fn load<S: Groups>(&self) -> WindowMoments<S> {
         // SAFETY: as the caller's; there are whole groups.
         unsafe {
             let mut rows = [S::splat_d(0.0); GROUP];
@@ -248,7 +236,7 @@ impl Lanewise {
     }
 }
 
-impl<S: Groups> WindowMoments<Doubles<S>> {
+impl<S: Groups> WindowMoments<S> {
     /// From most moments, window by window, and z.
     ///
     /// # Safety
@@ -466,7 +454,7 @@ impl Matrices {
     /// # Safety
     /// The processor has the instruction set of `S`; the pixels are in the run.
     #[inline(always)]
-    pub unsafe fn note<S: Simd>(&mut self, moments: &WindowMoments<Doubles<S>>, at: usize) {
+    pub unsafe fn note<S: Simd>(&mut self, moments: &WindowMoments<S>, at: usize) {
         // SAFETY: as the caller's.
         unsafe {
             let [x, y, z, xx, xy, xz, yy, yz, zz] = moments.sums;
