@@ -106,12 +106,24 @@ impl Rects {
         // SAFETY: as the caller's; an element has fours of channels.
         unsafe {
             let mut channels = [Doubles::splat(0.0); N];
-            for first in (0..N).step_by(4) {
+            let [a, b, c, d] = &self.corners;
+            let eights = N / GROUP * GROUP;
+            for first in (0..eights).step_by(GROUP) {
+                let mut windows = [S::splat_d(0.0); GROUP];
+                for lane in 0..GROUP {
+                    let at = |corner: &Indices| S::load_d(sums.add(corner[lane] as usize + first));
+                    windows[lane] = S::sub_d(S::sub_d(at(d), at(c)), S::sub_d(at(b), at(a)));
+                }
+                let eight = S::transpose_d(windows);
+                for i in 0..GROUP {
+                    channels[first + i] = Doubles(eight[i]);
+                }
+            }
+            for first in (eights..N).step_by(4) {
                 let at = |corner: &Indices, lane: usize| {
                     let four = |i: usize| sums.add(corner[lane + 4 * i] as usize + first);
                     Doubles::<S>(S::load_fours_d(four))
                 };
-                let [a, b, c, d] = &self.corners;
                 let mut windows = [S::splat_d(0.0); 4];
                 for i in 0..4 {
                     windows[i] = ((at(d, i) - at(c, i)) - (at(b, i) - at(a, i))).0;
