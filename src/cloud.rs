@@ -268,12 +268,15 @@ impl<'a> Points<'a> {
         (unsafe { self.z.byte_add(y * self.grid.row_stride) }, self.grid.point_stride)
     }
 
-    /// Asks for the cache lines of row `y`, if there is one: the hardware does not see the next row coming where rows
-    /// are read in pieces.
+    /// Asks for the cache lines of so many points of row `y`, from column `x` on, if there is such a row: the hardware
+    /// does not see it coming where rows are read in pieces.
     #[inline(always)]
-    pub(crate) fn prefetch_row(&self, y: usize) {
+    pub(crate) fn prefetch(&self, y: usize, x: usize, count: usize) {
         if y < self.grid.height {
-            prefetch(self.z_row(y).0, self.grid.width * self.grid.point_stride);
+            prefetch(
+                self.z.wrapping_byte_add(self.grid.offset(x, y)),
+                count * self.grid.point_stride,
+            );
         }
     }
 

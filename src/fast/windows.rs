@@ -57,13 +57,12 @@ impl Sweep {
         start..start + length
     }
 
-    /// Reads a row's depths; `next` is the one to be read after it.
+    /// Reads a row's depths.
     #[inline(always)]
-    fn read_z(&mut self, points: &Points, order: LaneOrder, y: usize, next: usize) {
+    fn read_z(&mut self, points: &Points, order: LaneOrder, y: usize) {
         let place = Self::z_place(order, y);
         let z = &mut self.z[place];
         let (row, stride) = points.z_row(y);
-        points.prefetch_row(next);
         // SAFETY: row y is inside the cloud, so it has a depth at every x below the width.
         unsafe { order.read(row, stride, z) };
         z[order.segment] = z[0].previous_lane(0.0);
@@ -118,12 +117,12 @@ impl<'a> WindowRows<'a> {
         sweep.start(order);
         let factor = options.max_depth_change_factor;
         let far = far(points.width(), points.height());
-        sweep.read_z(points, order, before, before + 1);
+        sweep.read_z(points, order, before);
         let mut depths = [Lanes([f32::INFINITY; LANES]), Lanes([f32::NEG_INFINITY; LANES])];
         for y in before..first + count {
             let last = y + 1 == points.height();
             if !last {
-                sweep.read_z(points, order, y + 1, y + 2);
+                sweep.read_z(points, order, y + 1);
             }
             // The row before the first is only tested against the first.
             let index = (y + 1).saturating_sub(first + 1);
@@ -133,7 +132,7 @@ impl<'a> WindowRows<'a> {
                 if last {
                     sweep.start_last_row::<S>(order, y, far, row, &mut depths);
                 } else {
-                    sweep.start_row::<S>(order, y, factor, far, row, &mut depths);
+                    sweep.start_row::<S>(points, order, y, factor, row, &mut depths);
                 }
                 if y > first {
                     let (above, row) = self.two_rows(index - 1);
@@ -207,17 +206,18 @@ fn floats_mut(row: &mut [Lanes]) -> &mut [f32] {
 
 impl Sweep {
     /// Depth changes of row `y`, from its depths and those of the next row: distance 0 at depth changes, `far`
-    /// elsewhere. Keeps the changes to the row below for the next row, and the least and largest finite depths.
+    /// elsewhere. Keeps the changes to the row below for the next row, and the least and largest finite depths. Asks
+    /// for the points two rows below.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`, which has sixteen lanes.
     #[inline(always)]
     unsafe fn start_row<S: Simd>(
         &mut self,
+        points: &Points,
         order: LaneOrder,
         y: usize,
         factor: f32,
-        far: f32,
         row: &mut [Lanes],
         depths: &mut [Lanes; 2],
     ) {
@@ -228,7 +228,7 @@ impl Sweep {
         let row = &mut row[..segment];
         // SAFETY: as the caller's.
         unsafe {
-            let far = S::splat(far);
+            let far = S::splat(far(points.width(), points.height()));
             let factor = S::splat(factor);
             let mut range = depths.map(|depth| depth.load::<S>());
             let end = z[segment - 1].load::<S>();
@@ -240,6 +240,7 @@ impl Sweep {
             let mut left = ends.next_lane(0.0).load::<S>();
             let mut own = z[0].load::<S>();
             for k in 0..segment {
+                points.prefetch(y + 2, k * LANES, LANES);
                 let right = z[k + 1].load::<S>();
                 let (lower, upper) = (below[k].load::<S>(), above[k].load::<S>());
                 let tested = tested[k].load::<S>();
@@ -305,7 +306,7 @@ impl Sweep {
     ) {
         let segment = order.segment;
         if smoothing.is_none() {
-            self.read_z(points, order, y, y.wrapping_sub(1));
+            self.read_z(points, order, y);
         }
         let z = &self.z[Self::z_place(order, y)];
         let (distances, sides) = (&row[1..=segment], &mut self.sides[..segment]);
@@ -327,6 +328,7 @@ impl Sweep {
             } else {
                 let (size, ten) = (S::splat(options.normal_smoothing_size), S::splat(10.0));
                 for k in 0..segment {
+                    points.prefetch(y.wrapping_sub(1), k * LANES, LANES);
                     let smoothing = S::add(size, S::div(z[k].load::<S>(), ten));
                     let side = side(distances[k].load::<S>(), smoothing);
                     so_far = S::max(side, so_far);
