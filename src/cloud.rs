@@ -8,7 +8,7 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 use crate::Error;
-use crate::simd::{Along, GROUP};
+use crate::simd::{Along, GROUP, Simd};
 
 /// The geometry that all fields of a view share. Strides are in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -367,6 +367,9 @@ pub struct Normals<'a> {
     normal: [*mut f32; 3],
     grid: Grid,
     curvature: Option<(*mut f32, Grid)>,
+    /// If all fields lie within eight floats, nx, ny and nz side by side: how many floats after nx the curvature is, 3 to
+    /// 7, or 0 if it is not wanted.
+    side_by_side: Option<usize>,
     lifetime: PhantomData<&'a mut [f32]>,
 }
 
@@ -432,7 +435,15 @@ impl<'a> Normals<'a> {
         grid: Grid,
         curvature: Option<(*mut f32, Grid)>,
     ) -> Result<Self, Error> {
-        let normals = Normals { normal, grid, curvature, lifetime: PhantomData };
+        let [nx, ny, nz] = normal;
+        let place = match curvature {
+            Some((field, other)) => {
+                (3..GROUP).find(|place| field == nx.wrapping_add(*place) && other == grid)
+            }
+            None => Some(0),
+        };
+        let side_by_side = place.filter(|_| ny == nx.wrapping_add(1) && nz == nx.wrapping_add(2));
+        let normals = Normals { normal, grid, curvature, side_by_side, lifetime: PhantomData };
         let fields = normals.fields();
         for (field, grid) in fields.iter().flatten() {
             check_field(*field, grid)?;
@@ -510,16 +521,16 @@ fn prefetch(at: *const f32, bytes: usize) {
 /// Asks for the cache lines that will be written a few groups later: normals are so far apart that stores would wait
 /// for their lines one by one.
 #[inline(always)]
-fn prefetch_for_writing(at: *mut f32, point_stride: usize) {
+fn prefetch_for_writing(at: *mut f32, lanes: usize, point_stride: usize) {
     #[cfg(target_arch = "x86_64")]
-    for pair in 0..4 {
+    for lane in (0..lanes).step_by(2) {
         use std::arch::x86_64::{_MM_HINT_ET0, _mm_prefetch};
-        let ahead = at.wrapping_byte_add((PIXELS_AHEAD + 2 * pair) * point_stride);
+        let ahead = at.wrapping_byte_add((PIXELS_AHEAD + lane) * point_stride);
         // SAFETY: a prefetch reads and writes nothing, whatever the address.
         unsafe { _mm_prefetch::<_MM_HINT_ET0>(ahead.cast()) };
     }
     #[cfg(not(target_arch = "x86_64"))]
-    let _ = (at, point_stride);
+    let _ = (at, lanes, point_stride);
 }
 
 /// How far ahead lines are asked for; found by trying 48 to 512 on 640x480, where more gains, and 1280x960, where it does
@@ -527,74 +538,28 @@ fn prefetch_for_writing(at: *mut f32, point_stride: usize) {
 #[cfg(target_arch = "x86_64")]
 const PIXELS_AHEAD: usize = 128;
 
-/// Stores the first two floats.
-///
-/// # Safety
-/// `to` is valid for their write.
-#[cfg(target_arch = "x86_64")]
-#[inline(always)]
-unsafe fn store_two(to: *mut f32, floats: std::arch::x86_64::__m128) {
-    use std::arch::x86_64::*;
-    // SAFETY: as the caller's; this store needs no alignment.
-    unsafe { _mm_storel_epi64(to.cast(), _mm_castps_si128(floats)) };
-}
-
 impl Normals<'_> {
-    /// Writes eight pixels of a row.
+    /// Writes as many pixels of a row as there are lanes: nx, ny, nz and the curvature.
     ///
     /// # Safety
-    /// As [`Normals::write`], for the pixels `x` to `x + 7`.
+    /// As [`Normals::write`], for the pixels from `x` on; the processor has the instruction set of `S`.
     #[inline(always)]
-    pub(crate) unsafe fn write_group(
-        &self,
-        x: usize,
-        y: usize,
-        normal: [&[f32; GROUP]; 3],
-        curvature: &[f32; GROUP],
-    ) {
+    pub(crate) unsafe fn write_lanes<S: Simd>(&self, x: usize, y: usize, fields: [S::F; 4]) {
         let (first, step) = (self.grid.offset(x, y), self.grid.point_stride);
-        let [nx, ny, nz] = self.normal.map(|field| field.wrapping_byte_add(first));
-        prefetch_for_writing(nx, step);
+        let nx = self.normal[0].wrapping_byte_add(first);
+        prefetch_for_writing(nx, S::LANES, step);
         // SAFETY: as the caller's.
         unsafe {
-            #[cfg(target_arch = "x86_64")]
-            if ny == nx.wrapping_add(1) && nz == nx.wrapping_add(2) {
-                use std::arch::x86_64::*;
-                // SSE is part of every x86-64; eight pixels, three floats together each.
-                for half in [0, 4] {
-                    let [x, y] = [0, 1].map(|c| _mm_loadu_ps(normal[c].as_ptr().add(half)));
-                    let z = _mm_loadu_ps(normal[2].as_ptr().add(half));
-                    let (xy_low, xy_high) = (_mm_unpacklo_ps(x, y), _mm_unpackhi_ps(x, y));
-                    let to = |lane: usize| nx.byte_add((half + lane) * step);
-                    store_two(to(0), xy_low);
-                    store_two(to(1), _mm_movehl_ps(xy_low, xy_low));
-                    store_two(to(2), xy_high);
-                    store_two(to(3), _mm_movehl_ps(xy_high, xy_high));
-                    _mm_store_ss(to(0).add(2), z);
-                    _mm_store_ss(to(1).add(2), _mm_shuffle_ps::<0b01>(z, z));
-                    _mm_store_ss(to(2).add(2), _mm_shuffle_ps::<0b10>(z, z));
-                    _mm_store_ss(to(3).add(2), _mm_shuffle_ps::<0b11>(z, z));
-                }
-                return self.write_group_curvature(x, y, curvature);
+            if let Some(place) = self.side_by_side {
+                return S::store_points(fields, place, nx, step);
             }
-            for lane in 0..8 {
-                nx.byte_add(lane * step).write(normal[0][lane]);
-                ny.byte_add(lane * step).write(normal[1][lane]);
-                nz.byte_add(lane * step).write(normal[2][lane]);
+            let mut lanes = [[0.0; 2 * GROUP]; 4];
+            for (to, field) in lanes.iter_mut().zip(fields) {
+                S::store(to.as_mut_ptr(), field);
             }
-            self.write_group_curvature(x, y, curvature);
-        }
-    }
-
-    /// # Safety
-    /// As [`Normals::write_group`].
-    #[inline(always)]
-    unsafe fn write_group_curvature(&self, x: usize, y: usize, curvature: &[f32; GROUP]) {
-        if let Some((field, grid)) = self.curvature {
-            let field = field.wrapping_byte_add(grid.offset(x, y));
-            for (lane, value) in curvature.iter().enumerate() {
-                // SAFETY: as the caller's.
-                unsafe { field.byte_add(lane * grid.point_stride).write(*value) };
+            let [nx, ny, nz, curvature] = lanes;
+            for lane in 0..S::LANES {
+                self.write(x + lane, y, [nx[lane], ny[lane], nz[lane]], curvature[lane]);
             }
         }
     }

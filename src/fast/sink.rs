@@ -5,7 +5,7 @@ use super::tile::Estimates;
 use crate::Error;
 use crate::cloud::Normals;
 use crate::memory::refill;
-use crate::simd::GROUP;
+use crate::simd::Simd;
 
 /// The output of one computation.
 pub(crate) enum Sink<'a> {
@@ -52,9 +52,9 @@ impl<'a> Sink<'a> {
     /// known to be NaN.
     ///
     /// # Safety
-    /// The pixels are inside the image, and no other thread writes them.
+    /// The pixels are inside the image, and no other thread writes them; the processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn write<const N: usize>(
+    pub unsafe fn write<S: Simd, const N: usize>(
         &self,
         x: usize,
         y: usize,
@@ -62,20 +62,22 @@ impl<'a> Sink<'a> {
         estimates: &Estimates<N>,
         curvature: bool,
     ) {
+        const { assert!(S::LANES == N) };
         let Estimates { normal: [nx, ny, nz], curvature: curvatures } = estimates;
         let normal = |lane: usize| [nx[lane], ny[lane], nz[lane]];
         match self {
             // SAFETY: as the caller's.
             Sink::All(normals) => unsafe {
-                let groups = count / GROUP * GROUP;
-                for at in (0..groups).step_by(GROUP) {
-                    let [nx, ny, nz, found] = [nx, ny, nz, curvatures]
-                        .map(|from| from[at..].first_chunk().expect("a whole group"));
-                    let curvature = if curvature { found } else { &[f32::NAN; GROUP] };
-                    normals.write_group(x + at, y, [nx, ny, nz], curvature);
-                }
-                for lane in groups..count {
-                    normals.write(x + lane, y, normal(lane), curvatures[lane]);
+                if count == S::LANES {
+                    let found = S::load(curvatures.as_ptr());
+                    let curvature = if curvature { found } else { S::splat(f32::NAN) };
+                    let (nx, ny) = (S::load(nx.as_ptr()), S::load(ny.as_ptr()));
+                    let fields = [nx, ny, S::load(nz.as_ptr()), curvature];
+                    normals.write_lanes::<S>(x, y, fields);
+                } else {
+                    for lane in 0..count {
+                        normals.write(x + lane, y, normal(lane), curvatures[lane]);
+                    }
                 }
             },
             Sink::Listed { normals, width, .. } => {
@@ -93,8 +95,8 @@ impl<'a> Sink<'a> {
     /// # Safety
     /// As [`Sink::write`].
     #[inline(always)]
-    pub unsafe fn write_none(&self, x: usize, y: usize, count: usize) {
+    pub unsafe fn write_none<S: Simd>(&self, x: usize, y: usize, count: usize) {
         // SAFETY: as the caller's.
-        unsafe { self.write(x, y, count, &Estimates::<LANES>::NONE, false) };
+        unsafe { self.write::<S, LANES>(x, y, count, &Estimates::NONE, false) };
     }
 }

@@ -154,9 +154,9 @@ impl Tile<'_> {
         let side = unsafe { self.largest_side::<S>() };
         if side == 0 {
             for y in self.rows.clone() {
-                for x in self.columns.clone().step_by(GROUP) {
+                for x in self.columns.clone().step_by(LANES) {
                     // SAFETY: as the caller's.
-                    unsafe { sink.write_none(x, y, (self.columns.end - x).min(GROUP)) };
+                    unsafe { sink.write_none::<S::Pair>(x, y, (self.columns.end - x).min(LANES)) };
                 }
             }
             return;
@@ -316,7 +316,7 @@ impl Tile<'_> {
                     let pair = Pair::new::<S>(self, row, x, y, inner);
                     let windows = pair.windows;
                     if windows == 0 {
-                        sink.write_none(x, y, (self.columns.end - x).min(LANES));
+                        sink.write_none::<S::Pair>(x, y, (self.columns.end - x).min(LANES));
                         continue;
                     }
                     let at = run.length * LANES;
@@ -393,7 +393,7 @@ impl Tile<'_> {
                     self.plain_lanes(&mut estimates, row, (x, y), plain);
                 }
                 let count = (self.columns.end - x).min(LANES);
-                sink.write(x, y, count, &estimates, M::CURVATURE);
+                sink.write::<S::Pair, LANES>(x, y, count, &estimates, M::CURVATURE);
             }
         }
     }

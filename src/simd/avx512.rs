@@ -65,6 +65,7 @@ impl Simd for Avx512 {
         truncate_i(a: Self::F) -> Self::I = Avx2::truncate_i;
         float_i(a: Self::I) -> Self::F = Avx2::float_i;
         load_points(first: *const f32, step: usize) -> [Self::F; 3] = Avx2::load_points;
+        store_points(fields: [Self::F; 4], place: usize, first: *mut f32, step: usize) = Avx2::store_points;
 
         splat_d(value: f64) -> Self::D = _mm512_set1_pd;
         load_d(from: *const f64) -> Self::D = _mm512_loadu_pd;
@@ -261,6 +262,35 @@ impl Simd for Avx512Pair {
                 _mm512_shuffle_f32x4::<0xee>(xy_ab, xy_cd),
                 _mm512_shuffle_f32x4::<0x44>(z_ab, z_cd),
             ]
+        }
+    }
+    #[inline(always)]
+    unsafe fn store_points(fields: [Self::F; 4], place: usize, first: *mut f32, step: usize) {
+        unsafe {
+            if step != size_of::<[f32; 8]>() {
+                let mut pairs = [[_mm256_setzero_ps(); 2]; 4];
+                for c in 0..4 {
+                    let high = _mm512_extractf32x8_ps::<1>(fields[c]);
+                    pairs[c] = [_mm512_castps512_ps256(fields[c]), high];
+                }
+                return TwoGroups::store_points(pairs, place, first, step);
+            }
+            let [x, y, z, fourth] = fields;
+            // Of lanes 0 and 1 of each four, and of lanes 2 and 3: x and y, z and the fourth.
+            let xy = [_mm512_unpacklo_ps(x, y), _mm512_unpackhi_ps(x, y)];
+            let rest = [_mm512_unpacklo_ps(z, fourth), _mm512_unpackhi_ps(z, fourth)];
+            // Two lanes' eight floats: what lies behind the third is the fourth, wherever it belongs.
+            let mut two =
+                _mm512_setr_epi32(0, 1, 16, 17, 17, 17, 17, 17, 2, 3, 18, 19, 19, 19, 19, 19);
+            let written = 0b111 | 1 << place;
+            for four in 0..4 {
+                for half in 0..2 {
+                    let points = _mm512_permutex2var_ps(xy[half], two, rest[half]);
+                    let to = first.add((4 * four + 2 * half) * 8);
+                    _mm512_mask_storeu_ps(to, written | written << 8, points);
+                }
+                two = _mm512_add_epi32(two, _mm512_set1_epi32(4));
+            }
         }
     }
 }

@@ -89,6 +89,9 @@ pub(crate) trait Simd: Copy {
 
     /// The first, second and third of each four floats, `step` bytes from one lane's to the next one's.
     unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3];
+    /// Stores the first three fields of every lane side by side, `step` bytes after those of the lane before, and the
+    /// fourth `place` floats after the first, 3 to 7, or not at all if that is 0. Nothing else is written.
+    unsafe fn store_points(fields: [Self::F; 4], place: usize, first: *mut f32, step: usize);
 
     /// `mask ? yes : no`
     #[inline(always)]
@@ -158,7 +161,7 @@ pub(crate) trait Along: Simd {
     }
 }
 
-/// [`Along::load_points`]
+/// [`Simd::load_points`]
 ///
 /// # Safety
 /// As [`Simd`].
@@ -174,6 +177,35 @@ unsafe fn load_points_by_fours<S: Along>(first: *const f32, step: usize) -> [S::
             S::load_fours(|four| point(4 * four + 3)),
         ]);
         [x, y, z]
+    }
+}
+
+/// [`Simd::store_points`]
+///
+/// # Safety
+/// As [`Simd`].
+#[inline(always)]
+unsafe fn store_points_by_lanes<S: Simd>(
+    fields: [S::F; 4],
+    place: usize,
+    first: *mut f32,
+    step: usize,
+) {
+    const { assert!(S::LANES == GROUP) };
+    let mut lanes = [[0.0; GROUP]; 4];
+    // SAFETY: as the caller's; the arrays hold so many lanes.
+    unsafe {
+        for (to, field) in lanes.iter_mut().zip(fields) {
+            S::store(to.as_mut_ptr(), field);
+        }
+        let [x, y, z, fourth] = lanes;
+        for lane in 0..GROUP {
+            let to = first.byte_add(lane * step);
+            to.cast::<[f32; 3]>().write([x[lane], y[lane], z[lane]]);
+            if place > 0 {
+                to.add(place).write(fourth[lane]);
+            }
+        }
     }
 }
 

@@ -6,7 +6,7 @@
 use std::arch::aarch64::*;
 
 use super::twice::Twice;
-use super::{Along, GROUP, Groups, Simd, load_points_by_fours};
+use super::{Along, GROUP, Groups, Simd, load_points_by_fours, store_points_by_lanes};
 
 /// What every 64-bit Arm has.
 #[derive(Clone, Copy)]
@@ -294,6 +294,10 @@ impl Simd for Neon {
     #[inline(always)]
     unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
         unsafe { load_points_by_fours::<Self>(first, step) }
+    }
+    #[inline(always)]
+    unsafe fn store_points(fields: [Self::F; 4], place: usize, first: *mut f32, step: usize) {
+        unsafe { store_points_by_lanes::<Self>(fields, place, first, step) }
     }
 }
 

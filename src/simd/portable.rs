@@ -1,7 +1,7 @@
 //! Eight lanes without any instruction set: what processors without a path of their own use.
 
 use super::twice::Twice;
-use super::{Along, GROUP, Groups, Simd, load_points_by_fours};
+use super::{Along, GROUP, Groups, Simd, load_points_by_fours, store_points_by_lanes};
 
 #[derive(Clone, Copy)]
 pub(crate) struct Portable;
@@ -246,6 +246,11 @@ impl Simd for Portable {
     unsafe fn load_points(first: *const f32, step: usize) -> [F; 3] {
         // SAFETY: as the caller's.
         unsafe { load_points_by_fours::<Self>(first, step) }
+    }
+    #[inline(always)]
+    unsafe fn store_points(fields: [F; 4], place: usize, first: *mut f32, step: usize) {
+        // SAFETY: as the caller's.
+        unsafe { store_points_by_lanes::<Self>(fields, place, first, step) }
     }
 }
 

@@ -223,6 +223,31 @@ unsafe fn assert_loads_points<S: Simd>() {
     }
 }
 
+/// Points are stored, however far apart they are, and nothing else.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+unsafe fn assert_stores_points<S: Simd>() {
+    let value = |c, lane| (10 * lane + c) as f32;
+    let fields: [[f32; 16]; 4] =
+        std::array::from_fn(|c| std::array::from_fn(|lane| value(c, lane)));
+    for (step, place) in [(3, 0), (4, 3), (8, 0), (8, 3), (8, 4), (8, 7), (9, 4), (12, 4)] {
+        let (mut found, mut expected) = ([-1.0; 200], [-1.0; 200]);
+        // SAFETY: as the caller's; all points are inside the floats.
+        unsafe {
+            let lanes = fields.each_ref().map(|field| S::load(field.as_ptr()));
+            let first = found.as_mut_ptr().add(1);
+            S::store_points(lanes, place, first, step * size_of::<f32>());
+        }
+        for lane in 0..S::LANES {
+            for c in 0..if place > 0 { 4 } else { 3 } {
+                expected[1 + lane * step + if c < 3 { c } else { place }] = value(c, lane);
+            }
+        }
+        assert_eq!(found, expected, "{step} floats apart, the fourth at {place}");
+    }
+}
+
 /// Integers of numbers that fit, to the nearest and towards zero.
 ///
 /// # Safety
@@ -244,8 +269,11 @@ unsafe fn assert_as_portable<S: Groups>() {
         assert_goes_along::<S>();
         assert_goes_along::<S::Widest>();
         assert_loads_points::<Portable>();
+        assert_stores_points::<Portable>();
         assert_loads_points::<S>();
+        assert_stores_points::<S>();
         assert_loads_points::<S::Pair>();
+        assert_stores_points::<S::Pair>();
     }
     for (a, b) in floats() {
         // SAFETY: as the caller's, and the portable path runs everywhere.

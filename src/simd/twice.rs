@@ -115,6 +115,16 @@ impl<S: Simd> Simd for Twice<S> {
         }
     }
     #[inline(always)]
+    unsafe fn store_points(fields: [Self::F; 4], place: usize, first: *mut f32, step: usize) {
+        // SAFETY: as the caller's.
+        unsafe {
+            let [[x0, x1], [y0, y1], [z0, z1], [fourth0, fourth1]] = fields;
+            S::store_points([x0, y0, z0, fourth0], place, first, step);
+            let second = first.byte_add(S::LANES * step);
+            S::store_points([x1, y1, z1, fourth1], place, second, step);
+        }
+    }
+    #[inline(always)]
     unsafe fn mask(bits: u32) -> Self::F {
         // SAFETY: as the caller's.
         unsafe { [S::mask(bits), S::mask(bits >> super::GROUP)] }

@@ -34,6 +34,44 @@ macro_rules! each {
     }};
 }
 
+/// Stores the first two lanes.
+#[inline(always)]
+unsafe fn store_two(to: *mut f32, lanes: __m128) {
+    unsafe { _mm_storel_epi64(to.cast(), _mm_castps_si128(lanes)) };
+}
+
+/// Stores four lanes, `step` bytes apart.
+#[inline(always)]
+unsafe fn store_apart(to: *mut f32, step: usize, lanes: __m128) {
+    unsafe {
+        _mm_store_ss(to, lanes);
+        _mm_store_ss(to.byte_add(step), _mm_shuffle_ps::<0b01>(lanes, lanes));
+        _mm_store_ss(to.byte_add(2 * step), _mm_shuffle_ps::<0b10>(lanes, lanes));
+        _mm_store_ss(to.byte_add(3 * step), _mm_shuffle_ps::<0b11>(lanes, lanes));
+    }
+}
+
+/// Four lanes of [`Simd::store_points`].
+#[inline(always)]
+unsafe fn store_four_points(
+    [x, y, z, fourth]: [__m128; 4],
+    place: usize,
+    first: *mut f32,
+    step: usize,
+) {
+    unsafe {
+        let (low, high) = (_mm_unpacklo_ps(x, y), _mm_unpackhi_ps(x, y));
+        store_two(first, low);
+        store_two(first.byte_add(step), _mm_movehl_ps(low, low));
+        store_two(first.byte_add(2 * step), high);
+        store_two(first.byte_add(3 * step), _mm_movehl_ps(high, high));
+        store_apart(first.add(2), step, z);
+        if place > 0 {
+            store_apart(first.add(place), step, fourth);
+        }
+    }
+}
+
 impl Simd for Sse2 {
     const LANES: usize = GROUP;
     type F = [__m128; 2];
@@ -241,6 +279,15 @@ impl Simd for Sse2 {
     #[inline(always)]
     unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
         unsafe { load_points_by_fours::<Self>(first, step) }
+    }
+    #[inline(always)]
+    unsafe fn store_points(fields: [Self::F; 4], place: usize, first: *mut f32, step: usize) {
+        unsafe {
+            let [[x0, x1], [y0, y1], [z0, z1], [fourth0, fourth1]] = fields;
+            let (low, high) = ([x0, y0, z0, fourth0], [x1, y1, z1, fourth1]);
+            store_four_points(low, place, first, step);
+            store_four_points(high, place, first.byte_add(4 * step), step);
+        }
     }
 }
 
@@ -539,6 +586,19 @@ impl Simd for Avx2 {
     #[inline(always)]
     unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
         unsafe { load_points_by_fours::<Self>(first, step) }
+    }
+    #[inline(always)]
+    unsafe fn store_points(fields: [Self::F; 4], place: usize, first: *mut f32, step: usize) {
+        unsafe {
+            let mut halves = [[_mm_setzero_ps(); 4]; 2];
+            for c in 0..4 {
+                halves[0][c] = _mm256_castps256_ps128(fields[c]);
+                halves[1][c] = _mm256_extractf128_ps::<1>(fields[c]);
+            }
+            let [low, high] = halves;
+            store_four_points(low, place, first, step);
+            store_four_points(high, place, first.byte_add(4 * step), step);
+        }
     }
 }
 

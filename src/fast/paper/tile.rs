@@ -160,7 +160,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 let (at, windows) = (pair * LANES, lanes[pair]);
                 let count = (end - x).div_ceil(step).min(LANES);
                 if windows == 0 {
-                    sink.write_none(x / step, y / step, count);
+                    sink.write_none::<S::Pair>(x / step, y / step, count);
                     continue;
                 }
                 let pixel =
@@ -182,7 +182,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 for lane in Bits(plain) {
                     normals.put(lane, self.plain(&cleaned, pixel(lane), &rect(lane)));
                 }
-                sink.write(x / step, y / step, count, &normals, M::CURVATURE);
+                sink.write::<S::Pair, LANES>(x / step, y / step, count, &normals, M::CURVATURE);
             }
         }
     }
