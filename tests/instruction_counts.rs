@@ -30,16 +30,16 @@ use Semantics::{Paper, Pcl};
 
 /// Instructions a pixel at most: with AVX2, with SSE2. The paper has no border policies.
 const BOUNDS: [(Semantics, Method, BorderPolicy, u64, u64); 10] = [
-    (Pcl, CovarianceMatrix, Ignore, 194, 391),
-    (Pcl, CovarianceMatrix, Mirror, 235, 441),
+    (Pcl, CovarianceMatrix, Ignore, 191, 391),
+    (Pcl, CovarianceMatrix, Mirror, 233, 441),
     (Pcl, Average3DGradient, Ignore, 105, 189),
-    (Pcl, Average3DGradient, Mirror, 137, 228),
-    (Pcl, AverageDepthChange, Ignore, 110, 196),
-    (Pcl, AverageDepthChange, Mirror, 204, 296),
+    (Pcl, Average3DGradient, Mirror, 136, 227),
+    (Pcl, AverageDepthChange, Ignore, 109, 195),
+    (Pcl, AverageDepthChange, Mirror, 203, 295),
     (Pcl, Simple3DGradient, Ignore, 104, 184),
-    (Paper, CovarianceMatrix, Ignore, 265, 486),
-    (Paper, Average3DGradient, Ignore, 235, 348),
-    (Paper, AverageDepthChange, Ignore, 221, 368),
+    (Paper, CovarianceMatrix, Ignore, 245, 486),
+    (Paper, Average3DGradient, Ignore, 212, 335),
+    (Paper, AverageDepthChange, Ignore, 221, 367),
 ];
 
 /// In metres.
