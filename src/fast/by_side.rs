@@ -14,9 +14,6 @@ pub(crate) trait BySide: Sums {
     /// The sums of one window.
     type Of1;
 
-    /// Whether pairs of groups are summed as such: not where a group's sums fill the registers.
-    const PAIRS: bool;
-
     /// Whether a window of an odd side has the sums of the next smaller one's.
     const EVEN: bool;
 
@@ -93,15 +90,8 @@ pub(crate) unsafe fn note<S: Groups, M: BySide>(
         if let (Some(side), Some(other)) = (first.one_side(), second.one_side())
             && side == other
         {
-            if M::PAIRS {
-                let both = sums.of_pixels::<S::Pair>(frame, planes, first.x, side);
-                M::note_lanes::<S::Pair>(both, run, at);
-            } else {
-                let first = sums.of_pixels::<S>(frame, planes, first.x, side);
-                M::note_lanes::<S>(first, run, at);
-                let second = sums.of_pixels::<S>(frame, planes, second.x, side);
-                M::note_lanes::<S>(second, run, at + GROUP);
-            }
+            let both = sums.of_pixels::<S::Pair>(frame, planes, first.x, side);
+            M::note_lanes::<S::Pair>(both, run, at);
             return 0;
         }
         let (of8, plain) = first.sum_up(sums, tile, frame, planes);

@@ -178,7 +178,6 @@ impl BySide for HalfWindows {
     type OfLanes<S: Simd> = Tangents<Floats<S>>;
     type Of1 = Tangents<f32>;
 
-    const PAIRS: bool = true;
     const EVEN: bool = true;
 
     #[inline(always)]

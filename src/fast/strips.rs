@@ -148,7 +148,6 @@ impl BySide for Strips {
     type OfLanes<S: Simd> = Gradients<S::I>;
     type Of1 = Infallible;
 
-    const PAIRS: bool = true;
     const EVEN: bool = false;
 
     #[inline(always)]
