@@ -22,8 +22,8 @@ struct Enclosed {
 }
 
 impl Enclosed {
-    /// So many floats of a value, right before the page behind them or, if `at_start`, right behind the one before.
-    fn new(count: usize, value: f32, at_start: bool) -> Self {
+    /// So many floats, right before the page behind them or, if `at_start`, right behind the one before.
+    fn new(count: usize, at_start: bool) -> Self {
         // SAFETY: a question.
         let page = unsafe { libc::sysconf(libc::_SC_PAGESIZE) } as usize;
         let bytes = count * size_of::<f32>();
@@ -41,7 +41,7 @@ impl Enclosed {
         let offset = if at_start { page } else { page + inner - bytes };
         let mut enclosed =
             Enclosed { map, length, first: map.wrapping_byte_add(offset).cast(), count };
-        enclosed.floats().fill(value);
+        enclosed.floats().fill(UNTOUCHED);
         enclosed
     }
 
@@ -74,11 +74,11 @@ fn check(cloud: &Cloud, options: &iine::Options, isa: iine::Isa) {
         for at_start in [false, true] {
             let what = format!("{isa:?}, {step} floats, curvature {curvature:?}, {options:?}");
             let fields = curvature.map_or(3, |place| place + 1);
-            let mut points = Enclosed::new((pixels - 1) * point_step + 3, UNTOUCHED, at_start);
+            let mut points = Enclosed::new((pixels - 1) * point_step + 3, at_start);
             for (to, point) in points.floats().chunks_mut(point_step).zip(&cloud.points) {
                 to[..3].copy_from_slice(point);
             }
-            let mut normals = Enclosed::new((pixels - 1) * step + fields, UNTOUCHED, at_start);
+            let mut normals = Enclosed::new((pixels - 1) * step + fields, at_start);
             let view = Points::interleaved(points.floats(), width, height, point_step, 0).unwrap();
             let output = normals.floats();
             let mut to = Normals::interleaved(output, width, height, step, 0, curvature).unwrap();

@@ -48,35 +48,25 @@ impl<'a> Sink<'a> {
         }
     }
 
-    /// Writes the first `count` of some estimates, for the pixels from `(x, y)` on. Without `curvature` all of those are
-    /// known to be NaN.
+    /// Writes the first `count` of some estimates, for the pixels from `(x, y)` on.
     ///
     /// # Safety
     /// The pixels are inside the image, and no other thread writes them; the processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn write<S: Simd, const N: usize>(
-        &self,
-        x: usize,
-        y: usize,
-        count: usize,
-        estimates: &Estimates<N>,
-        curvature: bool,
-    ) {
-        const { assert!(S::LANES == N) };
-        let Estimates { normal: [nx, ny, nz], curvature: curvatures } = estimates;
+    pub unsafe fn write<S: Simd>(&self, x: usize, y: usize, count: usize, estimates: &Estimates) {
+        const { assert!(S::LANES == LANES) };
+        let Estimates { normal: [nx, ny, nz], curvature } = estimates;
         let normal = |lane: usize| [nx[lane], ny[lane], nz[lane]];
         match self {
             // SAFETY: as the caller's.
             Sink::All(normals) => unsafe {
-                if count == S::LANES {
-                    let found = S::load(curvatures.as_ptr());
-                    let curvature = if curvature { found } else { S::splat(f32::NAN) };
+                if count == LANES {
                     let (nx, ny) = (S::load(nx.as_ptr()), S::load(ny.as_ptr()));
-                    let fields = [nx, ny, S::load(nz.as_ptr()), curvature];
-                    normals.write_lanes::<S>(x, y, fields);
+                    let (nz, curvature) = (S::load(nz.as_ptr()), S::load(curvature.as_ptr()));
+                    normals.write_lanes::<S>(x, y, [nx, ny, nz, curvature]);
                 } else {
                     for lane in 0..count {
-                        normals.write(x + lane, y, normal(lane), curvatures[lane]);
+                        normals.write(x + lane, y, normal(lane), curvature[lane]);
                     }
                 }
             },
@@ -84,7 +74,7 @@ impl<'a> Sink<'a> {
                 for (pixel, element) in self.listed(x, y, count) {
                     let lane = *pixel as usize - (y * width + x);
                     // SAFETY: as the caller's; every listed element is one of the normals.
-                    unsafe { normals.write(*element as usize, 0, normal(lane), curvatures[lane]) };
+                    unsafe { normals.write(*element as usize, 0, normal(lane), curvature[lane]) };
                 }
             }
         }
@@ -97,6 +87,6 @@ impl<'a> Sink<'a> {
     #[inline(always)]
     pub unsafe fn write_none<S: Simd>(&self, x: usize, y: usize, count: usize) {
         // SAFETY: as the caller's.
-        unsafe { self.write::<S, LANES>(x, y, count, &Estimates::NONE, false) };
+        unsafe { self.write::<S>(x, y, count, &Estimates::NONE) };
     }
 }

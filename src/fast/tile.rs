@@ -393,7 +393,7 @@ impl Tile<'_> {
                     self.plain_lanes(&mut estimates, row, (x, y), plain);
                 }
                 let count = (self.columns.end - x).min(LANES);
-                sink.write::<S::Pair, LANES>(x, y, count, &estimates, M::CURVATURE);
+                sink.write::<S::Pair>(x, y, count, &estimates);
             }
         }
     }
@@ -436,7 +436,7 @@ impl Tile<'_> {
     #[cold]
     fn plain_lanes(
         &self,
-        estimates: &mut Estimates<LANES>,
+        estimates: &mut Estimates,
         row: &[f32],
         (x, y): (usize, usize),
         lanes: u32,
@@ -614,13 +614,14 @@ impl Iterator for Bits {
 
 /// Normals and curvatures of pixels side by side.
 #[repr(C, align(64))]
-pub(crate) struct Estimates<const N: usize> {
-    pub normal: [[f32; N]; 3],
-    pub curvature: [f32; N],
+pub(crate) struct Estimates {
+    pub normal: [[f32; LANES]; 3],
+    pub curvature: [f32; LANES],
 }
 
-impl<const N: usize> Estimates<N> {
-    pub const NONE: Self = Estimates { normal: [[f32::NAN; N]; 3], curvature: [f32::NAN; N] };
+impl Estimates {
+    pub const NONE: Self =
+        Estimates { normal: [[f32::NAN; LANES]; 3], curvature: [f32::NAN; LANES] };
 
     #[inline(always)]
     pub fn put(&mut self, lane: usize, estimate: Estimate) {
@@ -641,7 +642,7 @@ impl<const N: usize> Estimates<N> {
         viewpoint: [f32; 3],
         lanes: u32,
     ) -> Self {
-        const { assert!(S::LANES == N) };
+        const { assert!(S::LANES == LANES) };
         // SAFETY: as the caller's; the arrays hold so many lanes each.
         unsafe {
             let [x, y, z] = viewpoint;
@@ -656,9 +657,9 @@ impl<const N: usize> Estimates<N> {
             let to = estimates.as_mut_ptr().cast::<f32>();
             for c in 0..3 {
                 let normal = S::select(mask, S::xor(normal[c].0, flip), none);
-                S::store(to.add(c * N), normal);
+                S::store(to.add(c * LANES), normal);
             }
-            S::store(to.add(3 * N), S::select(mask, curvature.0, none));
+            S::store(to.add(3 * LANES), S::select(mask, curvature.0, none));
             estimates.assume_init()
         }
     }

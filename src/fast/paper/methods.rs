@@ -15,9 +15,6 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
     /// What the normals of a run of pixels are made from.
     type OfRun: Noted;
 
-    /// Whether the method gives a curvature.
-    const CURVATURE: bool;
-
     /// Whether the window's outermost rows and columns are not summed over.
     const INNER: bool;
 
@@ -102,7 +99,6 @@ impl Channels<MOMENTS> for CovarianceMatrix {
 impl Sums<MOMENTS> for CovarianceMatrix {
     type OfRun = Matrices;
 
-    const CURVATURE: bool = true;
     const INNER: bool = false;
     const ENDS: bool = false;
 
@@ -202,7 +198,6 @@ impl Channels<8> for Gradients {
 impl Sums<8> for Gradients {
     type OfRun = Tangents;
 
-    const CURVATURE: bool = false;
     const INNER: bool = true;
     const ENDS: bool = false;
 
@@ -249,7 +244,6 @@ impl Channels<4> for SmoothedDepthChanges {
 impl Sums<4> for SmoothedDepthChanges {
     type OfRun = Tangents;
 
-    const CURVATURE: bool = false;
     const INNER: bool = true;
     const ENDS: bool = true;
 

@@ -178,11 +178,11 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 }
                 let viewpoint = self.options.viewpoint;
                 let (sure, here) = (windows & !plain, points.load::<S::Pair>(at));
-                let mut normals = Estimates::<LANES>::of(found, here, viewpoint, sure);
+                let mut normals = Estimates::of(found, here, viewpoint, sure);
                 for lane in Bits(plain) {
                     normals.put(lane, self.plain(&cleaned, pixel(lane), &rect(lane)));
                 }
-                sink.write::<S::Pair, LANES>(x / step, y / step, count, &normals, M::CURVATURE);
+                sink.write::<S::Pair>(x / step, y / step, count, &normals);
             }
         }
     }
