@@ -13,6 +13,9 @@ pub(crate) struct Floats<S: Simd>(pub S::F);
 /// As many f64 as there are lanes.
 pub(crate) struct Doubles<S: Simd>(pub S::D);
 
+/// As many i32 as there are lanes; sums wrap around.
+pub(crate) struct Integers<S: Simd>(pub S::I);
+
 macro_rules! operators {
     ($type:ident, $($trait:ident, $method:ident, $function:ident;)*) => {
         impl<S: Simd> Clone for $type<S> {
@@ -35,6 +38,7 @@ macro_rules! operators {
 
 operators!(Floats, Add, add, add; Sub, sub, sub; Mul, mul, mul; Div, div, div;);
 operators!(Doubles, Add, add, add_d; Sub, sub, sub_d; Mul, mul, mul_d; Div, div, div_d;);
+operators!(Integers, Add, add, add_i; Sub, sub, sub_i;);
 
 impl<S: Simd> Floats<S> {
     /// # Safety
@@ -105,6 +109,14 @@ impl<S: Simd> Doubles<S> {
     pub fn narrow(self) -> Floats<S> {
         // SAFETY: there is a group, so there is the instruction set.
         Floats(unsafe { S::narrow(self.0) })
+    }
+}
+
+impl<S: Simd> Integers<S> {
+    #[inline(always)]
+    pub fn float(self) -> Floats<S> {
+        // SAFETY: there is a group, so there is the instruction set.
+        Floats(unsafe { S::float_i(self.0) })
     }
 }
 

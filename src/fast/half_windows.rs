@@ -1,27 +1,208 @@
-//! Sums of half windows of z, for AVERAGE_DEPTH_CHANGE: the paper's one integral image, in f64.
+//! Sums of half windows of z, for AVERAGE_DEPTH_CHANGE: the paper's one integral image.
+//!
+//! It is of integers, twice as many of which fit in a register, where these are fine enough, and of f64 else. Half
+//! windows of one point are read from the points: exactly.
 
-use super::arithmetic::{Doubles, Floats, cross, dot};
-use super::buffer::Buffer;
+use super::arithmetic::{Doubles, Floats, Integers, cross, dot};
+use super::buffer::{Buffer, Number};
 use super::by_side::{self, BySide};
 use super::planes::{Corners, Frame, MARGIN, Planes, sum_between};
-use super::run::OfRun;
+use super::run::{Lane, OfRun};
 use super::tile::{Found, Pair, Sums, Tile};
 use crate::Error;
+use crate::cloud::Points;
+use crate::depth_change::threshold;
 use crate::memory::{bytes, make_room};
+use crate::options::Options;
 use crate::paper::ROUNDING;
-use crate::simd::{GROUP, Groups, Simd};
-use crate::window::Image;
+use crate::simd::{Along, Groups, Simd};
+use crate::window::{Image, Rect};
 
 /// The ring of integral rows of z.
 #[derive(Debug, Default)]
-pub(crate) struct HalfWindows {
-    integrals: Buffer<f64>,
+pub(crate) struct HalfWindows<T> {
+    integrals: Buffer<T>,
     /// The place of the row pushed last; before the first the one after the ring, which is zero.
     pushed: usize,
-    /// The square of what rounding errors of the sums stay below, times [`DOUBT_ROUNDING`].
+    /// What depths are multiplied by.
+    scale: f32,
+    /// Of [`DOUBT_ROUNDING`].
     doubt: f32,
-    /// By the side of a window.
+    /// By half of the side of a window.
     places: Vec<Places>,
+    /// In the ring of points, the rows around the one aimed at.
+    rows: [usize; 3],
+}
+
+/// What depths are summed up in.
+pub(crate) trait Depth: Lane + Number {
+    /// As many lanes as are added along a row at once.
+    type Along<S: Groups>: Simd;
+
+    /// What rounding hardly ever moves a difference between two half windows' sums by more than: where depths are
+    /// multiplied by `scale`, none is larger than `limit`, and the ring holds so many. Of integers, over the root of
+    /// the points in a half window.
+    fn error(scale: f32, limit: f32, held: usize) -> f64;
+
+    /// What that is divided by, squared, for means over so many points.
+    fn error_of_means<S: Simd>(points: Floats<S>) -> Floats<S>;
+
+    /// From a depth that has been multiplied.
+    fn of_one(depth: f32) -> Self;
+
+    fn plus(self, other: Self) -> Self;
+
+    fn minus(self, other: Self) -> Self;
+
+    /// A sum of `count` depths, less `depth` as often.
+    fn about(self, depth: Self, count: i32) -> f64;
+
+    /// From depths that have been multiplied.
+    fn of<S: Simd>(depths: Floats<S>) -> Self::Of<S>;
+
+    /// The sums along the row, going on from `carry`, which becomes the last one.
+    fn running_sum<S: Groups>(
+        depths: Self::Of<Self::Along<S>>,
+        carry: &mut Self::Of<Self::Along<S>>,
+    ) -> Self::Of<Self::Along<S>>;
+
+    fn floats<S: Simd>(sums: Self::Of<S>) -> Floats<S>;
+}
+
+impl Depth for f64 {
+    type Along<S: Groups> = S;
+
+    fn error(_scale: f32, limit: f32, held: usize) -> f64 {
+        2.0 * ROUNDING * f64::from(limit) * held as f64
+    }
+
+    #[inline(always)]
+    fn error_of_means<S: Simd>(points: Floats<S>) -> Floats<S> {
+        points * points
+    }
+
+    fn of_one(depth: f32) -> f64 {
+        depth.into()
+    }
+
+    fn plus(self, other: f64) -> f64 {
+        self + other
+    }
+
+    fn minus(self, other: f64) -> f64 {
+        self - other
+    }
+
+    fn about(self, depth: f64, count: i32) -> f64 {
+        self - depth * f64::from(count)
+    }
+
+    #[inline(always)]
+    fn of<S: Simd>(depths: Floats<S>) -> Doubles<S> {
+        depths.widen()
+    }
+
+    #[inline(always)]
+    fn running_sum<S: Groups>(depths: Doubles<S>, carry: &mut Doubles<S>) -> Doubles<S> {
+        // SAFETY: there is a group, so there is the instruction set.
+        Doubles(unsafe { S::running_sum_d(depths.0, &mut carry.0) })
+    }
+
+    #[inline(always)]
+    fn floats<S: Simd>(sums: Doubles<S>) -> Floats<S> {
+        sums.narrow()
+    }
+}
+
+impl Depth for i32 {
+    type Along<S: Groups> = S::Widest;
+
+    fn error(scale: f32, _limit: f32, _held: usize) -> f64 {
+        // 3.7 standard deviations: the variance of a rounding is a twelfth of a step's square.
+        1.5 / f64::from(scale)
+    }
+
+    #[inline(always)]
+    fn error_of_means<S: Simd>(points: Floats<S>) -> Floats<S> {
+        points
+    }
+
+    fn of_one(depth: f32) -> i32 {
+        depth.round_ties_even() as i32
+    }
+
+    fn plus(self, other: i32) -> i32 {
+        self.wrapping_add(other)
+    }
+
+    fn minus(self, other: i32) -> i32 {
+        self.wrapping_sub(other)
+    }
+
+    fn about(self, depth: i32, count: i32) -> f64 {
+        self.wrapping_sub(depth.wrapping_mul(count)).into()
+    }
+
+    #[inline(always)]
+    fn of<S: Simd>(depths: Floats<S>) -> Integers<S> {
+        // SAFETY: there is a group, so there is the instruction set.
+        Integers(unsafe { S::round_i(depths.0) })
+    }
+
+    #[inline(always)]
+    fn running_sum<S: Groups>(
+        depths: Integers<S::Widest>,
+        carry: &mut Integers<S::Widest>,
+    ) -> Integers<S::Widest> {
+        // SAFETY: there is a group, so there is the instruction set.
+        Integers(unsafe { S::Widest::running_sum_i(depths.0, &mut carry.0) })
+    }
+
+    #[inline(always)]
+    fn floats<S: Simd>(sums: Integers<S>) -> Floats<S> {
+        sums.float()
+    }
+}
+
+/// What depths, of which none is larger than `deepest`, are multiplied by to become integers; none if these would not
+/// be fine enough for windows of up to `side`.
+pub(crate) fn scale_to_integers(
+    points: &Points,
+    options: &Options,
+    deepest: f32,
+    side: usize,
+) -> Option<f32> {
+    // From one point of a window to the next there is no depth change. It is a step more than half the side from a
+    // half window to the other, and no more, in the mean, from the pixel to either.
+    let change = threshold(deepest, options.max_depth_change_factor);
+    let apart = f64::from(2.0 * deepest).min(f64::from(change) * (side / 2 + 1) as f64);
+    // Sums may wrap around; points and differences must fit.
+    let bits = 30.9 - (points_in_half(side) as f64 * apart).log2();
+    let bits = bits.min(30.0 - f64::from(deepest).log2());
+    let scale = bits.floor().clamp(-120.0, 120.0).exp2() as f32;
+    (1.0 < FINE * spacing(points) * scale).then_some(scale)
+}
+
+/// How far neighbours in a row are apart: the lower quartile of some here and there, so that a few that are far off do
+/// no harm; 0 if there are none.
+fn spacing(points: &Points) -> f32 {
+    let places = |size: usize| (1..SAMPLES).map(move |i| i * size / SAMPLES);
+    let pixels = places(points.height()).flat_map(|y| places(points.width()).map(move |x| (x, y)));
+    let apart = pixels.map(|(x, y)| {
+        let (a, b) = (points.at(x.max(1) - 1, y), points.at(x.max(1), y));
+        (0..3).map(|c| (a[c] - b[c]) * (a[c] - b[c])).sum::<f32>().sqrt()
+    });
+    let (mut sorted, mut count) = ([0.0; (SAMPLES - 1) * (SAMPLES - 1)], 0);
+    for spacing in apart.filter(|spacing| 0.0 < *spacing && spacing.is_finite()) {
+        sorted[count] = spacing;
+        count += 1;
+    }
+    sorted[..count].sort_unstable_by(f32::total_cmp);
+    sorted[count / 4]
+}
+
+fn points_in_half(side: usize) -> usize {
+    (side / 2) * (side / 2)
 }
 
 /// Horizontal and vertical tangent.
@@ -32,19 +213,25 @@ const DOUBT_SINE: f32 = 1e-6;
 /// Or where the sums' rounding could.
 const DOUBT_ROUNDING: f64 = 1e8;
 
+/// How large a part of the spacing of points a step of integers may be: then few windows are doubtful.
+const FINE: f32 = 1.6e-4;
+
+/// The spacing is looked at in one less rows and columns.
+const SAMPLES: usize = 8;
+
 /// What a window is made from, from the column of its pixel on.
 #[derive(Debug)]
 struct Places {
     /// In the ring of integrals: the half windows to the left and right, above and below.
     halves: [Corners; 4],
-    /// One over the points in a half window.
-    share: f64,
+    /// One over the points in a half window, and over the scale of sums.
+    share: f32,
     /// In the ring of points, the ends of both tangents: left and right, above and below.
     ends: [[usize; 2]; 2],
 }
 
 impl Places {
-    fn of(frame: &Frame, y: usize, side: usize) -> Self {
+    fn of(frame: &Frame, y: usize, side: usize, scale: f32) -> Self {
         let (half, quarter) = ((side / 2) as isize, (side / 4) as isize);
         // Integrals end before a half window and with it.
         let ends = |first: isize| [first - 1, first + half - 1];
@@ -59,7 +246,7 @@ impl Places {
                 half_window(-quarter, -half),
                 half_window(-quarter, 1),
             ],
-            share: 1.0 / (half * half) as f64,
+            share: 1.0 / (points_in_half(side) as f32 * scale),
             ends: [
                 [point(-quarter - 1, 0), point(quarter + 1, 0)],
                 [point(-1, -quarter), point(1, quarter)],
@@ -68,23 +255,43 @@ impl Places {
     }
 }
 
-impl Sums for HalfWindows {
+impl<T: Depth> HalfWindows<T> {
+    /// With depths multiplied so.
+    pub fn scaled(&mut self, scale: f32) -> &mut Self {
+        self.scale = scale;
+        self
+    }
+
+    /// The sum over pixels inside the image.
+    #[inline]
+    fn sum(&self, frame: &Frame, rect: &Rect) -> T {
+        let along = |end_row: usize| {
+            if end_row == 0 {
+                return T::default();
+            }
+            let row = frame.place(end_row - 1) * frame.stride;
+            let to = |x: usize| self.integrals[row + frame.column(x) - 1];
+            to(rect.x.end).minus(to(rect.x.start))
+        };
+        along(rect.y.end).minus(along(rect.y.start))
+    }
+}
+
+impl<T: Depth> Sums for HalfWindows<T> {
     type OfRun = OfRun<f32, 6>;
 
-    const COLUMN: usize = size_of::<f64>();
+    const COLUMN: usize = size_of::<T>();
     const CURVATURE: bool = false;
     const LIMITED: bool = false;
 
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {
         frame.reserve_ring(1, &mut self.integrals)?;
-        make_room(&mut self.places, side + 1)
+        make_room(&mut self.places, side / 2 + 1)
     }
 
     fn start(&mut self, frame: &Frame, limit: f32, _side: usize, _origin: [f32; 3]) {
         self.pushed = frame.start_ring(1, &mut self.integrals);
-        let pixels = frame.columns.len() * frame.rows.len();
-        // What the rounding errors of a difference between two sums stay below.
-        let error = 2.0 * ROUNDING * f64::from(limit) * pixels as f64;
+        let error = T::error(self.scale, limit, frame.columns.len() * frame.rows.len());
         self.doubt = (DOUBT_ROUNDING * error * error) as f32;
     }
 
@@ -95,29 +302,34 @@ impl Sums for HalfWindows {
     #[inline(always)]
     unsafe fn push<S: Groups>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
         let place = frame.place(y);
-        let groups = frame.steps::<S>();
-        assert!(MARGIN + groups * GROUP <= frame.stride);
+        let (steps, lanes) = (frame.steps::<T::Along<S>>(), <T::Along<S> as Simd>::LANES);
+        assert!(MARGIN + steps * lanes <= frame.stride);
         assert!(frame.start_of(1, frame.ring + 1) <= self.integrals.len());
         let z = planes.row(frame, 2, y).as_ptr();
         let integrals = self.integrals.as_mut_ptr();
-        // SAFETY: as the caller's; the groups lie inside the row of the ring, as was just checked.
+        // SAFETY: as the caller's; the lanes lie inside the row of the ring, as was just checked.
         unsafe {
             let above = integrals.add(frame.start_of(1, self.pushed));
             let row = integrals.add(frame.start_of(1, place));
-            *row.add(MARGIN - 1) = 0.0;
-            let mut carry = S::splat_d(0.0);
-            for group in 0..groups {
-                let at = MARGIN + group * GROUP;
-                let along = S::running_sum_d(S::widen(S::load(z.add(at))), &mut carry);
-                S::store_d(row.add(at), S::add_d(along, S::load_d(above.add(at))));
+            *row.add(MARGIN - 1) = T::default();
+            let scale = Floats::splat(self.scale);
+            let mut carry = T::of::<T::Along<S>>(Floats::splat(0.0));
+            for step in 0..steps {
+                let at = MARGIN + step * lanes;
+                let depths = T::of::<T::Along<S>>(Floats::load(z.add(at)) * scale);
+                let along = T::running_sum::<S>(depths, &mut carry);
+                let sums = along + T::load::<T::Along<S>>(above.add(at));
+                T::store::<T::Along<S>>(row.add(at), sums);
             }
         }
         self.pushed = place;
     }
 
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
+        let scale = self.scale;
         self.places.clear();
-        self.places.extend((0..=side).map(|side| Places::of(frame, y, side)));
+        self.places.extend((0..=side / 2).map(|half| Places::of(frame, y, 2 * half, scale)));
+        self.rows = std::array::from_fn(|row| frame.start(3, (y + row).wrapping_sub(1)));
     }
 
     #[inline(always)]
@@ -153,8 +365,7 @@ impl Sums for HalfWindows {
             let doubt = Floats::splat(self.doubt);
             let half = Floats::<S>(S::truncate(S::mul(sides, S::splat(0.5))));
             let points = half * half;
-            let exact = (doubt * (h2 + v2)).lt(n2 * points * points);
-            let exact_ends = doubt.lt(h2) & doubt.lt(v2);
+            let exact = (doubt * (h2 + v2)).lt(n2 * T::error_of_means(points));
             // Below this, squares of floats lose digits.
             let least = Floats::splat(f32::MIN_POSITIVE / f32::EPSILON);
             // In windows of 3 both tangents join the same two points: floats decide the direction, as in PCL.
@@ -163,7 +374,7 @@ impl Sums for HalfWindows {
             let zero = Floats::splat(0.0);
             let parallel = !(zero.lt(n[0].abs().max(n[1].abs()).max(n[2].abs())));
             let floats_decide = least.lt(n2) | parallel & least.lt(h2) & least.lt(v2);
-            let floats_decide = smallest & exact_ends & floats_decide;
+            let floats_decide = smallest & floats_decide;
             let scale = Floats::splat(1.0) / n2.sqrt();
             Found {
                 normal: [n[0] * scale, n[1] * scale, n[2] * scale],
@@ -174,7 +385,7 @@ impl Sums for HalfWindows {
     }
 }
 
-impl BySide for HalfWindows {
+impl<T: Depth> BySide for HalfWindows<T> {
     type OfLanes<S: Simd> = Tangents<Floats<S>>;
     type Of1 = Tangents<f32>;
 
@@ -188,16 +399,24 @@ impl BySide for HalfWindows {
         x: usize,
         side: usize,
     ) -> Self::OfLanes<S> {
-        let Places { halves, share, ends } = &self.places[side];
+        let half = side / 2;
+        let Places { halves, share, ends } = &self.places[half];
         let x = frame.column(x);
-        // SAFETY: as the caller's: rows and columns are held, and so are the groups from these columns on.
+        // SAFETY: as the caller's: rows and columns are held, and so are the lanes from these columns on.
         unsafe {
-            let ring = self.integrals.as_ptr().add(x);
-            let share = Doubles::<S>::splat(*share);
-            let [left, right, up, down] = halves;
-            let across = (sum_between::<S>(ring, right) - sum_between(ring, left)) * share;
-            let along = (sum_between::<S>(ring, down) - sum_between(ring, up)) * share;
-            let mut tangents = [[across.narrow(); 3], [along.narrow(); 3]];
+            let mut tangents = if half == 1 {
+                let z = planes.as_ptr().add(x + 2 * frame.stride);
+                let at = |row: usize| Floats::<S>::load(z.wrapping_add(self.rows[row]));
+                let next = |x: isize| Floats::load(z.wrapping_add(self.rows[1]).wrapping_offset(x));
+                [[next(1) - next(-1); 3], [at(2) - at(0); 3]]
+            } else {
+                let ring = self.integrals.as_ptr().add(x);
+                let [left, right, up, down] = halves;
+                let sum = |half: &Corners| sum_between::<S, T>(ring, half);
+                let (across, along) = (sum(right) - sum(left), sum(down) - sum(up));
+                let share = Floats::<S>::splat(*share);
+                [[T::floats::<S>(across) * share; 3], [T::floats::<S>(along) * share; 3]]
+            };
             for c in 0..2 {
                 let plane = planes.as_ptr().add(x + c * frame.stride);
                 let point = |end: usize| Floats::load(plane.wrapping_add(end));
@@ -241,25 +460,23 @@ impl BySide for HalfWindows {
         side: usize,
     ) -> Option<Self::Of1> {
         let (half, quarter) = (side / 2, (side / 4) as isize);
+        if half == 1 {
+            return None; // floats decide there
+        }
+        let scale = f64::from(self.scale);
+        let own = T::of_one(planes.row(frame, 2, y)[frame.column(x)] * self.scale);
         let (x, y) = (x as isize, y as isize);
         let mean = |start: (isize, isize)| {
-            let (mut sum, mut count) = (0.0, 0_i32);
+            let (mut sum, mut count) = (T::default(), 0_i32);
             for rect in image.rects(start, (half, half)) {
                 if rect.x.is_empty() || rect.y.is_empty() {
                     continue;
                 }
-                let segment = |end_row: usize| {
-                    if end_row == 0 {
-                        return 0.0;
-                    }
-                    let row = frame.place(end_row - 1) * frame.stride;
-                    self.integrals[row + frame.column(rect.x.end) - 1]
-                        - self.integrals[row + frame.column(rect.x.start) - 1]
-                };
-                sum += f64::from(rect.sign) * (segment(rect.y.end) - segment(rect.y.start));
+                let of_rect = self.sum(frame, &rect);
+                sum = if rect.sign > 0 { sum.plus(of_rect) } else { sum.minus(of_rect) };
                 count += rect.sign * (rect.x.len() * rect.y.len()) as i32;
             }
-            (count > 0).then(|| sum / f64::from(count))
+            (count > 0).then(|| sum.about(own, count) / (scale * f64::from(count)))
         };
         let left = mean((x - half as isize, y - quarter))?;
         let right = mean((x + 1, y - quarter))?;

@@ -26,7 +26,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use buffer::Buffer;
-use half_windows::HalfWindows;
+use half_windows::{HalfWindows, scale_to_integers};
 use lanes::{LANES, Lanes};
 use moments::Moments;
 use paths::Task;
@@ -83,7 +83,9 @@ struct WorkerScratch {
     moments: Moments,
     strip_pairs: StripPairs,
     strips: Strips,
-    half_windows: HalfWindows,
+    /// One of the two is in use, if any.
+    half_windows: HalfWindows<f64>,
+    integer_half_windows: HalfWindows<i32>,
     paper: paper::WorkerScratch,
 }
 
@@ -108,12 +110,15 @@ impl Scratch {
 }
 
 impl WorkerScratch {
-    /// Makes room for a method's tiles with frames that are no larger, and windows of up to `side`.
-    fn reserve(&mut self, method: Method, frame: &Frame, side: usize) -> Result<(), Error> {
+    /// Makes room for a job's tiles with frames that are no larger, and windows of up to `side`.
+    fn reserve(&mut self, job: &Job, frame: &Frame, side: usize) -> Result<(), Error> {
         self.planes.reserve(frame)?;
-        match method {
+        match job.options.method {
             Method::CovarianceMatrix => self.moments.reserve(frame, side),
             Method::Average3DGradient => self.strip_pairs.reserve(frame, side),
+            Method::AverageDepthChange if job.scale.is_some() => {
+                self.integer_half_windows.reserve(frame, side)
+            }
             Method::AverageDepthChange => self.half_windows.reserve(frame, side),
             Method::Simple3DGradient => self.strips.reserve(frame, side),
         }
@@ -126,6 +131,7 @@ impl WorkerScratch {
             + self.strip_pairs.size()
             + self.strips.size()
             + self.half_windows.size()
+            + self.integer_half_windows.size()
             + self.paper.size()
     }
 }
@@ -188,6 +194,8 @@ struct Job<'a> {
     options: &'a Options,
     image: Image,
     whole_points: bool,
+    /// What depths are multiplied by to become integers, where these are fine enough for [`HalfWindows`].
+    scale: Option<f32>,
 }
 
 /// The normals of the pixels that `indices` list, or of all.
@@ -206,7 +214,7 @@ pub(crate) fn compute(
 
     let image = Image { width, height, border_policy: options.border_policy };
     let whole_points = points.has_whole_points(normals);
-    let job = Job { isa, points, options, image, whole_points };
+    let mut job = Job { isa, points, options, image, whole_points, scale: None };
 
     for scratch in &each[..count] {
         lock(scratch).sweep.reserve(width)?;
@@ -231,9 +239,12 @@ pub(crate) fn compute(
     let sides = Sides { rows, width, chunks };
     let sink = Sink::new(normals, indices, width, listed)?;
     let side = (side as usize).min(width.min(height));
+    if options.method == Method::AverageDepthChange {
+        job.scale = scale_to_integers(points, options, deepest, side);
+    }
     let frame = Frame::largest(job.columns(reach), side, width);
     for scratch in &each[..count] {
-        lock(scratch).reserve(options.method, &frame, side)?;
+        lock(scratch).reserve(&job, &frame, side)?;
     }
     job.tiles(workers, each, reach, deepest, sides, &sink);
     Ok(())
@@ -352,7 +363,7 @@ impl Job<'_> {
                 sides,
             };
             let scratch = &mut lock(&each[worker]);
-            let task = TileTask { tile: &tile, scratch, sink };
+            let task = TileTask { job: self, tile: &tile, scratch, sink };
             // SAFETY: the processor has the instruction set of the job, and tiles do not share pixels.
             unsafe { paths::run(self.isa, task) };
         });
@@ -364,7 +375,8 @@ impl Job<'_> {
             + match self.options.method {
                 Method::CovarianceMatrix => Moments::COLUMN,
                 Method::Average3DGradient => StripPairs::COLUMN,
-                Method::AverageDepthChange => HalfWindows::COLUMN,
+                Method::AverageDepthChange if self.scale.is_some() => HalfWindows::<i32>::COLUMN,
+                Method::AverageDepthChange => HalfWindows::<f64>::COLUMN,
                 Method::Simple3DGradient => Strips::COLUMN,
             };
         let bytes = column * Frame::ring(reach);
@@ -403,6 +415,7 @@ impl Task for SweepTask<'_> {
 
 /// One tile, with the sums of its method; no one else writes the tile's pixels.
 struct TileTask<'a> {
+    job: &'a Job<'a>,
     tile: &'a Tile<'a>,
     scratch: &'a mut WorkerScratch,
     sink: &'a Sink<'a>,
@@ -413,17 +426,21 @@ impl Task for TileTask<'_> {
 
     #[inline(always)]
     unsafe fn run<S: Groups>(self) {
-        let TileTask { tile, scratch, sink } = self;
-        let WorkerScratch { frame, planes, moments, strip_pairs, strips, half_windows, .. } =
-            scratch;
+        let TileTask { job, tile, scratch, sink } = self;
+        let WorkerScratch { frame, planes, moments, strip_pairs, strips, .. } = scratch;
+        let WorkerScratch { half_windows, integer_half_windows, .. } = scratch;
         // SAFETY: as the caller's.
         unsafe {
             match tile.options.method {
                 Method::CovarianceMatrix => tile.compute::<S, _>(frame, planes, moments, sink),
                 Method::Average3DGradient => tile.compute::<S, _>(frame, planes, strip_pairs, sink),
-                Method::AverageDepthChange => {
-                    tile.compute::<S, _>(frame, planes, half_windows, sink)
-                }
+                Method::AverageDepthChange => match job.scale {
+                    Some(scale) => {
+                        let sums = integer_half_windows.scaled(scale);
+                        tile.compute::<S, _>(frame, planes, sums, sink);
+                    }
+                    None => tile.compute::<S, _>(frame, planes, half_windows.scaled(1.0), sink),
+                },
                 Method::Simple3DGradient => tile.compute::<S, _>(frame, planes, strips, sink),
             }
         }

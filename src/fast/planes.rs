@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use super::arithmetic::Doubles;
 use super::buffer::{Buffer, Number};
 use super::lanes::LANES;
+use super::run::Lane;
 use crate::Error;
 use crate::cloud::Points;
 use crate::simd::{Along, GROUP, Simd};
@@ -124,13 +124,13 @@ pub(crate) type Corners = [usize; 4];
 /// The sum between the corners, of integral rows.
 ///
 /// # Safety
-/// The processor has the instruction set of `S`, and the groups at these corners are inside the ring.
+/// The processor has the instruction set of `S`, and the lanes at these corners are inside the ring.
 #[inline(always)]
-pub(crate) unsafe fn sum_between<S: Simd>(ring: *const f64, corners: &Corners) -> Doubles<S> {
+pub(crate) unsafe fn sum_between<S: Simd, T: Lane>(ring: *const T, corners: &Corners) -> T::Of<S> {
     let [left_above, right_above, left_below, right_below] = *corners;
     // SAFETY: as the caller's.
     unsafe {
-        let at = |corner: usize| Doubles(S::load_d(ring.wrapping_add(corner)));
+        let at = |corner: usize| T::load::<S>(ring.wrapping_add(corner));
         (at(right_below) - at(left_below)) - (at(right_above) - at(left_above))
     }
 }

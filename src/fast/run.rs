@@ -3,7 +3,9 @@
 //! A normal is a chain of operations each of which waits for the one before. A processor looks ahead a few hundred
 //! operations only: it works at several pixels' chains at a time if each step is made for all of them before the next.
 
-use super::arithmetic::{Doubles, Floats};
+use std::ops::{Add, Sub};
+
+use super::arithmetic::{Doubles, Floats, Integers};
 use super::lanes::LANES;
 use crate::simd::{Groups, Simd};
 
@@ -23,7 +25,7 @@ impl<T: Lane, const N: usize> Default for OfRun<T, N> {
 /// Numbers that lanes hold.
 pub(crate) trait Lane: Copy + Default {
     /// As many as there are lanes.
-    type Of<S: Simd>: Copy;
+    type Of<S: Simd>: Copy + Add<Output = Self::Of<S>> + Sub<Output = Self::Of<S>>;
 
     /// # Safety
     /// The processor has the instruction set of `S`; there are so many numbers.
@@ -67,18 +69,18 @@ impl Lane for f64 {
 }
 
 impl Lane for i32 {
-    type Of<S: Simd> = S::I;
+    type Of<S: Simd> = Integers<S>;
 
     #[inline(always)]
-    unsafe fn load<S: Simd>(from: *const i32) -> S::I {
+    unsafe fn load<S: Simd>(from: *const i32) -> Integers<S> {
         // SAFETY: as the caller's.
-        unsafe { S::load_i(from) }
+        Integers(unsafe { S::load_i(from) })
     }
 
     #[inline(always)]
-    unsafe fn store<S: Simd>(to: *mut i32, value: S::I) {
+    unsafe fn store<S: Simd>(to: *mut i32, value: Integers<S>) {
         // SAFETY: as the caller's.
-        unsafe { S::store_i(to, value) };
+        unsafe { S::store_i(to, value.0) };
     }
 }
 

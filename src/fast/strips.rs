@@ -5,11 +5,11 @@
 
 use std::convert::Infallible;
 
-use super::arithmetic::Floats;
+use super::arithmetic::Integers;
 use super::buffer::Buffer;
 use super::by_side::{self, BySide};
 use super::gradients::Scale;
-use super::planes::{Corners, Frame, MARGIN, Planes};
+use super::planes::{Corners, Frame, MARGIN, Planes, sum_between};
 use super::run::OfRun;
 use super::tile::{Found, Pair, Sums, Tile};
 use crate::Error;
@@ -138,14 +138,15 @@ impl Sums for Strips {
         // SAFETY: as the caller's.
         unsafe {
             let [hx, hy, hz, vx, vy, vz] = run.load::<S>(at);
-            let [h, v] = [float::<S>([hx, hy, hz]), float::<S>([vx, vy, vz])];
+            let h = [hx.float(), hy.float(), hz.float()];
+            let v = [vx.float(), vy.float(), vz.float()];
             self.scale.normals(h, v, sides)
         }
     }
 }
 
 impl BySide for Strips {
-    type OfLanes<S: Simd> = Gradients<S::I>;
+    type OfLanes<S: Simd> = Gradients<Integers<S>>;
     type Of1 = Infallible;
 
     const EVEN: bool = false;
@@ -165,8 +166,8 @@ impl BySide for Strips {
             let mut sums = Self::none::<S>();
             for c in 0..3 {
                 let x = x + c * frame.stride;
-                sums[0][c] = difference::<S>(self.columns.as_ptr().add(x), columns);
-                sums[1][c] = difference::<S>(self.rows.as_ptr().add(x), rows);
+                sums[0][c] = sum_between(self.columns.as_ptr().add(x), columns);
+                sums[1][c] = sum_between(self.rows.as_ptr().add(x), rows);
             }
             sums
         }
@@ -182,7 +183,8 @@ impl BySide for Strips {
         for g in 0..2 {
             for c in 0..3 {
                 // SAFETY: as the caller's.
-                sums[g][c] = unsafe { S::select_i(lanes, yes[g][c], no[g][c]) };
+                let lane = unsafe { S::select_i(lanes, yes[g][c].0, no[g][c].0) };
+                sums[g][c] = Integers(lane);
             }
         }
         sums
@@ -191,7 +193,7 @@ impl BySide for Strips {
     #[inline(always)]
     unsafe fn none<S: Simd>() -> Self::OfLanes<S> {
         // SAFETY: as the caller's.
-        [[unsafe { S::splat_i(0) }; 3]; 2]
+        [[Integers(unsafe { S::splat_i(0) }); 3]; 2]
     }
 
     fn of_mirrored(
@@ -211,30 +213,13 @@ impl BySide for Strips {
     }
 
     #[inline(always)]
-    unsafe fn note_lanes<S: Simd>(sums: Gradients<S::I>, run: &mut OfRun<i32, 6>, at: usize) {
+    unsafe fn note_lanes<S: Simd>(
+        sums: Gradients<Integers<S>>,
+        run: &mut OfRun<i32, 6>,
+        at: usize,
+    ) {
         let [[a, b, c], [d, e, f]] = sums;
         // SAFETY: as the caller's.
         unsafe { run.store::<S>(at, [a, b, c, d, e, f]) }
     }
-}
-
-/// The difference between the right and left of what is below and above, in a ring.
-///
-/// # Safety
-/// The processor has the instruction set of `S`, and the groups at these corners are inside the ring.
-#[inline(always)]
-unsafe fn difference<S: Simd>(ring: *const i32, corners: &Corners) -> S::I {
-    // SAFETY: as the caller's.
-    unsafe {
-        let at = |corner: usize| S::load_i(ring.wrapping_add(corners[corner]));
-        S::sub_i(S::sub_i(at(3), at(2)), S::sub_i(at(1), at(0)))
-    }
-}
-
-/// # Safety
-/// The processor has the instruction set of `S`.
-#[inline(always)]
-unsafe fn float<S: Simd>(v: [S::I; 3]) -> [Floats<S>; 3] {
-    // SAFETY: as the caller's.
-    unsafe { [Floats(S::float_i(v[0])), Floats(S::float_i(v[1])), Floats(S::float_i(v[2]))] }
 }
