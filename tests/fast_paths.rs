@@ -255,6 +255,29 @@ fn the_steepest_surfaces_equal_the_plain_form() {
     println!("{worst:?}");
 }
 
+/// Coordinates at both ends of what sums of integers allow, and a window's side a power of two as they are.
+#[test]
+fn points_on_opposite_sides_equal_the_plain_form() {
+    let mut worst = Worst::default();
+    let (width, height) = (80, 60);
+    for (columns, rows) in [(40, 0), (0, 30)] {
+        let point = |at: usize| {
+            let (x, y) = (at % width, at / width);
+            let side = |at: usize, middle: usize, along: usize| match middle {
+                0 => (along as f32 - 40.0) / 40.0,
+                _ if at < middle => -2.0,
+                _ => 2.0,
+            };
+            [side(x, columns, x), side(y, rows, y), 2.0 - (x + y) as f32 / 512.0]
+        };
+        let cloud = Cloud { width, height, points: (0..width * height).map(point).collect() };
+        for method in methods() {
+            worst.check(&cloud, "opposite", &options(method, 16.0, false));
+        }
+    }
+    println!("{worst:?}");
+}
+
 const CANARY: f32 = -12345.5;
 
 /// The cloud in an array of points of `stride` floats, rows `row` floats apart.

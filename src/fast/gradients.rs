@@ -16,23 +16,24 @@ pub(crate) struct Scale {
     doubt: f32,
 }
 
-/// Rounding to integers moves a sum of 4 `side` coordinates by about sqrt(side). A normal is doubtful where that could
-/// turn it by more than 1e-4, or where floats could: (sine of the angle between the tangents) < 1e-3.
-const DOUBT_ROUNDING: f32 = 4e8;
+/// Rounding to integers hardly ever moves a sum of so many coordinates by more than their root. A normal is doubtful
+/// where that could turn it by more than 1e-4, or where floats could: (sine of the angle between the tangents) < 1e-3.
+const DOUBT_ROUNDING: f32 = 1e8;
 const DOUBT_SINE: f32 = 1e-6;
 
 impl Scale {
-    /// For sums of 4 `side` coordinates, none of which is farther than `limit` from the origin.
-    pub fn new(limit: f32, side: usize, origin: [f32; 3]) -> Self {
-        // 4 side limit scale < 2^31, and a power of two.
-        let mut bits = 29.0 - (f64::from(limit) * side as f64).log2();
-        let mut doubt = DOUBT_ROUNDING;
+    /// For windows of up to `side`, sums of up to `strips` times as many coordinates, none of which is farther than
+    /// `limit` from the origin.
+    pub fn new(strips: usize, limit: f32, side: usize, origin: [f32; 3]) -> Self {
+        // strips side limit scale < 2^31, and a power of two: one exactly as large will not do.
+        let mut bits = 31.0 - (f64::from(limit) * (strips * side) as f64).log2();
+        let mut doubt = DOUBT_ROUNDING * strips as f32;
         if origin != [0.0; 3] {
             // The way from there is rounded to a float first: for limit scale < 2^25 that at most doubles the error.
             bits = bits.min(25.0 - f64::from(limit).log2());
             doubt *= 4.0;
         }
-        Scale { origin, scale: bits.floor().clamp(-120.0, 120.0).exp2() as f32, doubt }
+        Scale { origin, scale: (bits.ceil() - 1.0).clamp(-120.0, 120.0).exp2() as f32, doubt }
     }
 
     /// Coordinates `c`, as integers.

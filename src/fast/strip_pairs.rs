@@ -216,7 +216,7 @@ impl Sums for StripPairs {
     fn start(&mut self, _frame: &Frame, limit: f32, side: usize, origin: [f32; 3]) {
         self.columns.fill(0);
         self.last.fill(0); // it is what is above the first row
-        self.scale = Scale::new(limit, side, origin);
+        self.scale = Scale::new(4, limit, side, origin);
     }
 
     fn size(&self) -> usize {

@@ -95,7 +95,7 @@ impl Sums for Strips {
 
     fn start(&mut self, frame: &Frame, limit: f32, side: usize, origin: [f32; 3]) {
         self.pushed = frame.start_ring(3, &mut self.columns);
-        self.scale = Scale::new(limit, side, origin);
+        self.scale = Scale::new(2, limit, side, origin);
     }
 
     fn size(&self) -> usize {
