@@ -1,21 +1,17 @@
 //! Sums of half windows of z, for AVERAGE_DEPTH_CHANGE: the paper's one integral image.
 //!
-//! It is of integers, twice as many of which fit in a register, where these are fine enough, and of f64 else. Half
-//! windows of one point are read from the points: exactly.
+//! It is of integers or of f64, as `depth` says. Half windows of one point are read from the points: exactly.
 
-use super::arithmetic::{Doubles, Floats, Integers, cross, dot};
-use super::buffer::{Buffer, Number};
+use super::arithmetic::{Floats, cross, dot};
+use super::buffer::Buffer;
 use super::by_side::{self, BySide};
+use super::depth::Depth;
 use super::planes::{Corners, Frame, MARGIN, Planes, sum_between};
-use super::run::{Lane, OfRun};
+use super::run::OfRun;
 use super::tile::{Found, Pair, Sums, Tile};
 use crate::Error;
-use crate::cloud::Points;
-use crate::depth_change::threshold;
 use crate::memory::{bytes, make_room};
-use crate::options::Options;
-use crate::paper::ROUNDING;
-use crate::simd::{Along, Groups, Simd};
+use crate::simd::{Groups, Simd};
 use crate::window::{Image, Rect};
 
 /// The ring of integral rows of z.
@@ -34,173 +30,6 @@ pub(crate) struct HalfWindows<T> {
     rows: [usize; 3],
 }
 
-/// What depths are summed up in.
-pub(crate) trait Depth: Lane + Number {
-    /// As many lanes as are added along a row at once.
-    type Along<S: Groups>: Simd;
-
-    /// What rounding hardly ever moves a difference between two half windows' sums by more than: where depths are
-    /// multiplied by `scale`, none is larger than `limit`, and the ring holds so many. Of integers, over the root of
-    /// the points in a half window.
-    fn error(scale: f32, limit: f32, held: usize) -> f64;
-
-    /// What that is divided by, squared, for means over so many points.
-    fn error_of_means<S: Simd>(points: Floats<S>) -> Floats<S>;
-
-    /// From a depth that has been multiplied.
-    fn of_one(depth: f32) -> Self;
-
-    fn plus(self, other: Self) -> Self;
-
-    fn minus(self, other: Self) -> Self;
-
-    /// A sum of `count` depths, less `depth` as often.
-    fn about(self, depth: Self, count: i32) -> f64;
-
-    /// From depths that have been multiplied.
-    fn of<S: Simd>(depths: Floats<S>) -> Self::Of<S>;
-
-    /// The sums along the row, going on from `carry`, which becomes the last one.
-    fn running_sum<S: Groups>(
-        depths: Self::Of<Self::Along<S>>,
-        carry: &mut Self::Of<Self::Along<S>>,
-    ) -> Self::Of<Self::Along<S>>;
-
-    fn floats<S: Simd>(sums: Self::Of<S>) -> Floats<S>;
-}
-
-impl Depth for f64 {
-    type Along<S: Groups> = S;
-
-    fn error(_scale: f32, limit: f32, held: usize) -> f64 {
-        2.0 * ROUNDING * f64::from(limit) * held as f64
-    }
-
-    #[inline(always)]
-    fn error_of_means<S: Simd>(points: Floats<S>) -> Floats<S> {
-        points * points
-    }
-
-    fn of_one(depth: f32) -> f64 {
-        depth.into()
-    }
-
-    fn plus(self, other: f64) -> f64 {
-        self + other
-    }
-
-    fn minus(self, other: f64) -> f64 {
-        self - other
-    }
-
-    fn about(self, depth: f64, count: i32) -> f64 {
-        self - depth * f64::from(count)
-    }
-
-    #[inline(always)]
-    fn of<S: Simd>(depths: Floats<S>) -> Doubles<S> {
-        depths.widen()
-    }
-
-    #[inline(always)]
-    fn running_sum<S: Groups>(depths: Doubles<S>, carry: &mut Doubles<S>) -> Doubles<S> {
-        // SAFETY: there is a group, so there is the instruction set.
-        Doubles(unsafe { S::running_sum_d(depths.0, &mut carry.0) })
-    }
-
-    #[inline(always)]
-    fn floats<S: Simd>(sums: Doubles<S>) -> Floats<S> {
-        sums.narrow()
-    }
-}
-
-impl Depth for i32 {
-    type Along<S: Groups> = S::Widest;
-
-    fn error(scale: f32, _limit: f32, _held: usize) -> f64 {
-        // 3.7 standard deviations: the variance of a rounding is a twelfth of a step's square.
-        1.5 / f64::from(scale)
-    }
-
-    #[inline(always)]
-    fn error_of_means<S: Simd>(points: Floats<S>) -> Floats<S> {
-        points
-    }
-
-    fn of_one(depth: f32) -> i32 {
-        depth.round_ties_even() as i32
-    }
-
-    fn plus(self, other: i32) -> i32 {
-        self.wrapping_add(other)
-    }
-
-    fn minus(self, other: i32) -> i32 {
-        self.wrapping_sub(other)
-    }
-
-    fn about(self, depth: i32, count: i32) -> f64 {
-        self.wrapping_sub(depth.wrapping_mul(count)).into()
-    }
-
-    #[inline(always)]
-    fn of<S: Simd>(depths: Floats<S>) -> Integers<S> {
-        // SAFETY: there is a group, so there is the instruction set.
-        Integers(unsafe { S::round_i(depths.0) })
-    }
-
-    #[inline(always)]
-    fn running_sum<S: Groups>(
-        depths: Integers<S::Widest>,
-        carry: &mut Integers<S::Widest>,
-    ) -> Integers<S::Widest> {
-        // SAFETY: there is a group, so there is the instruction set.
-        Integers(unsafe { S::Widest::running_sum_i(depths.0, &mut carry.0) })
-    }
-
-    #[inline(always)]
-    fn floats<S: Simd>(sums: Integers<S>) -> Floats<S> {
-        sums.float()
-    }
-}
-
-/// What depths, of which none is larger than `deepest`, are multiplied by to become integers; none if these would not
-/// be fine enough for windows of up to `side`.
-pub(crate) fn scale_to_integers(
-    points: &Points,
-    options: &Options,
-    deepest: f32,
-    side: usize,
-) -> Option<f32> {
-    // From one point of a window to the next there is no depth change. It is a step more than half the side from a
-    // half window to the other, and no more, in the mean, from the pixel to either.
-    let change = threshold(deepest, options.max_depth_change_factor);
-    let apart = f64::from(2.0 * deepest).min(f64::from(change) * (side / 2 + 1) as f64);
-    // Sums may wrap around; points and differences must fit.
-    let bits = 30.9 - (points_in_half(side) as f64 * apart).log2();
-    let bits = bits.min(30.0 - f64::from(deepest).log2());
-    let scale = bits.floor().clamp(-120.0, 120.0).exp2() as f32;
-    (1.0 < FINE * spacing(points) * scale).then_some(scale)
-}
-
-/// How far neighbours in a row are apart: the lower quartile of some here and there, so that a few that are far off do
-/// no harm; 0 if there are none.
-fn spacing(points: &Points) -> f32 {
-    let places = |size: usize| (1..SAMPLES).map(move |i| i * size / SAMPLES);
-    let pixels = places(points.height()).flat_map(|y| places(points.width()).map(move |x| (x, y)));
-    let apart = pixels.map(|(x, y)| {
-        let (a, b) = (points.at(x.max(1) - 1, y), points.at(x.max(1), y));
-        (0..3).map(|c| (a[c] - b[c]) * (a[c] - b[c])).sum::<f32>().sqrt()
-    });
-    let (mut sorted, mut count) = ([0.0; (SAMPLES - 1) * (SAMPLES - 1)], 0);
-    for spacing in apart.filter(|spacing| 0.0 < *spacing && spacing.is_finite()) {
-        sorted[count] = spacing;
-        count += 1;
-    }
-    sorted[..count].sort_unstable_by(f32::total_cmp);
-    sorted[count / 4]
-}
-
 fn points_in_half(side: usize) -> usize {
     (side / 2) * (side / 2)
 }
@@ -212,12 +41,6 @@ type Tangents<T> = [[T; 3]; 2];
 const DOUBT_SINE: f32 = 1e-6;
 /// Or where the sums' rounding could.
 const DOUBT_ROUNDING: f64 = 1e8;
-
-/// How large a part of the spacing of points a step of integers may be: then few windows are doubtful.
-const FINE: f32 = 1.6e-4;
-
-/// The spacing is looked at in one less rows and columns.
-const SAMPLES: usize = 8;
 
 /// What a window is made from, from the column of its pixel on.
 #[derive(Debug)]
@@ -365,7 +188,7 @@ impl<T: Depth> Sums for HalfWindows<T> {
             let doubt = Floats::splat(self.doubt);
             let half = Floats::<S>(S::truncate(S::mul(sides, S::splat(0.5))));
             let points = half * half;
-            let exact = (doubt * (h2 + v2)).lt(n2 * T::error_of_means(points));
+            let exact = (doubt * (h2 + v2)).lt(n2 * T::reduction(points));
             // Below this, squares of floats lose digits.
             let least = Floats::splat(f32::MIN_POSITIVE / f32::EPSILON);
             // In windows of 3 both tangents join the same two points: floats decide the direction, as in PCL.

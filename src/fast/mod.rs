@@ -7,6 +7,7 @@
 mod arithmetic;
 mod buffer;
 mod by_side;
+mod depth;
 mod gradients;
 mod half_windows;
 mod lanes;
@@ -26,7 +27,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use buffer::Buffer;
-use half_windows::{HalfWindows, scale_to_integers};
+use depth::scale_to_integers;
+use half_windows::HalfWindows;
 use lanes::{LANES, Lanes};
 use moments::Moments;
 use paths::Task;

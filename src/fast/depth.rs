@@ -1,0 +1,185 @@
+//! What AVERAGE_DEPTH_CHANGE sums depths up in: 32-bit integers, twice as many of which fit in a register, where they
+//! are fine enough, and f64 else.
+
+use super::arithmetic::{Doubles, Floats, Integers};
+use super::buffer::Number;
+use super::run::Lane;
+use crate::cloud::Points;
+use crate::depth_change::threshold;
+use crate::options::Options;
+use crate::paper::ROUNDING;
+use crate::simd::{Along, Groups, Simd};
+
+/// What depths are summed up in.
+pub(crate) trait Depth: Lane + Number {
+    /// As many lanes as are added along a row at once.
+    type Along<S: Groups>: Simd;
+
+    /// What rounding hardly ever moves a difference between two half windows' sums by more than: where depths are
+    /// multiplied by `scale`, none is larger than `limit`, and the ring holds so many. Of integers, over the root of
+    /// the points in a half window.
+    fn error(scale: f32, limit: f32, held: usize) -> f64;
+
+    /// What the square of that is divided by for means over so many points.
+    fn reduction<S: Simd>(points: Floats<S>) -> Floats<S>;
+
+    /// From a depth that has been multiplied.
+    fn of_one(depth: f32) -> Self;
+
+    fn plus(self, other: Self) -> Self;
+
+    fn minus(self, other: Self) -> Self;
+
+    /// A sum of `count` depths, less `depth` as often.
+    fn about(self, depth: Self, count: i32) -> f64;
+
+    /// From depths that have been multiplied.
+    fn of<S: Simd>(depths: Floats<S>) -> Self::Of<S>;
+
+    /// The sums along the row, going on from `carry`, which becomes the last one.
+    fn running_sum<S: Groups>(
+        depths: Self::Of<Self::Along<S>>,
+        carry: &mut Self::Of<Self::Along<S>>,
+    ) -> Self::Of<Self::Along<S>>;
+
+    fn floats<S: Simd>(sums: Self::Of<S>) -> Floats<S>;
+}
+
+impl Depth for f64 {
+    type Along<S: Groups> = S;
+
+    fn error(_scale: f32, limit: f32, held: usize) -> f64 {
+        2.0 * ROUNDING * f64::from(limit) * held as f64
+    }
+
+    #[inline(always)]
+    fn reduction<S: Simd>(points: Floats<S>) -> Floats<S> {
+        points * points
+    }
+
+    fn of_one(depth: f32) -> f64 {
+        depth.into()
+    }
+
+    fn plus(self, other: f64) -> f64 {
+        self + other
+    }
+
+    fn minus(self, other: f64) -> f64 {
+        self - other
+    }
+
+    fn about(self, depth: f64, count: i32) -> f64 {
+        self - depth * f64::from(count)
+    }
+
+    #[inline(always)]
+    fn of<S: Simd>(depths: Floats<S>) -> Doubles<S> {
+        depths.widen()
+    }
+
+    #[inline(always)]
+    fn running_sum<S: Groups>(depths: Doubles<S>, carry: &mut Doubles<S>) -> Doubles<S> {
+        // SAFETY: there is a group, so there is the instruction set.
+        Doubles(unsafe { S::running_sum_d(depths.0, &mut carry.0) })
+    }
+
+    #[inline(always)]
+    fn floats<S: Simd>(sums: Doubles<S>) -> Floats<S> {
+        sums.narrow()
+    }
+}
+
+impl Depth for i32 {
+    type Along<S: Groups> = S::Widest;
+
+    fn error(scale: f32, _limit: f32, _held: usize) -> f64 {
+        // 3.7 standard deviations: the variance of a rounding is a twelfth of a step's square.
+        1.5 / f64::from(scale)
+    }
+
+    #[inline(always)]
+    fn reduction<S: Simd>(points: Floats<S>) -> Floats<S> {
+        points
+    }
+
+    fn of_one(depth: f32) -> i32 {
+        depth.round_ties_even() as i32
+    }
+
+    fn plus(self, other: i32) -> i32 {
+        self.wrapping_add(other)
+    }
+
+    fn minus(self, other: i32) -> i32 {
+        self.wrapping_sub(other)
+    }
+
+    fn about(self, depth: i32, count: i32) -> f64 {
+        self.wrapping_sub(depth.wrapping_mul(count)).into()
+    }
+
+    #[inline(always)]
+    fn of<S: Simd>(depths: Floats<S>) -> Integers<S> {
+        // SAFETY: there is a group, so there is the instruction set.
+        Integers(unsafe { S::round_i(depths.0) })
+    }
+
+    #[inline(always)]
+    fn running_sum<S: Groups>(
+        depths: Integers<S::Widest>,
+        carry: &mut Integers<S::Widest>,
+    ) -> Integers<S::Widest> {
+        // SAFETY: there is a group, so there is the instruction set.
+        Integers(unsafe { S::Widest::running_sum_i(depths.0, &mut carry.0) })
+    }
+
+    #[inline(always)]
+    fn floats<S: Simd>(sums: Integers<S>) -> Floats<S> {
+        sums.float()
+    }
+}
+
+/// How large a part of the spacing of points a step of integers may be: then few windows are doubtful.
+const FINE: f32 = 1.6e-4;
+
+/// The spacing is looked at in one less rows and columns.
+const SAMPLES: usize = 8;
+
+/// What depths, of which none is larger than `deepest`, are multiplied by to become integers; none if these would not
+/// be fine enough for windows of up to `side`.
+pub(crate) fn scale_to_integers(
+    points: &Points,
+    options: &Options,
+    deepest: f32,
+    side: usize,
+) -> Option<f32> {
+    let half = side / 2;
+    // From one point of a window to the next there is no depth change. It is a step more than half the side from a
+    // half window to the other, and no more, in the mean, from the pixel to either.
+    let change = threshold(deepest, options.max_depth_change_factor);
+    let apart = f64::from(2.0 * deepest).min(f64::from(change) * (half + 1) as f64);
+    // Sums may wrap around; points and differences must fit.
+    let bits = 30.9 - ((half * half) as f64 * apart).log2();
+    let bits = bits.min(30.0 - f64::from(deepest).log2());
+    let scale = bits.floor().clamp(-120.0, 120.0).exp2() as f32;
+    (1.0 < FINE * spacing(points) * scale).then_some(scale)
+}
+
+/// How far neighbours in a row are apart: the lower quartile of some here and there, so that a few that are far off do
+/// no harm; 0 if there are none.
+fn spacing(points: &Points) -> f32 {
+    let places = |size: usize| (1..SAMPLES).map(move |i| i * size / SAMPLES);
+    let pixels = places(points.height()).flat_map(|y| places(points.width()).map(move |x| (x, y)));
+    let apart = pixels.map(|(x, y)| {
+        let (a, b) = (points.at(x.max(1) - 1, y), points.at(x.max(1), y));
+        (0..3).map(|c| (a[c] - b[c]) * (a[c] - b[c])).sum::<f32>().sqrt()
+    });
+    let (mut sorted, mut count) = ([0.0; (SAMPLES - 1) * (SAMPLES - 1)], 0);
+    for spacing in apart.filter(|spacing| 0.0 < *spacing && spacing.is_finite()) {
+        sorted[count] = spacing;
+        count += 1;
+    }
+    sorted[..count].sort_unstable_by(f32::total_cmp);
+    sorted[count / 4]
+}
