@@ -225,29 +225,29 @@ fn the_steepest_surfaces_equal_the_plain_form() {
     let mut worst = Worst::default();
     let (width, height) = (101, 90);
     for factor in [0.02, 0.1] {
+        let mut depths = vec![2.0_f32];
+        while depths.len() < width + height {
+            let z = depths[depths.len() - 1];
+            let turned = depths.len() / 60 % 2 == 1;
+            let step = 1.96 * factor * (z + 1.0) * if turned { -0.9 } else { 1.0 };
+            depths.push(z + step);
+        }
         for (across, along) in [(1.0, 0.0), (0.0, -1.0), (0.7, 0.7)] {
-            for smoothing in SMOOTHING {
-                let mut depths = vec![2.0_f32];
-                while depths.len() < width + height {
-                    let z = depths[depths.len() - 1];
-                    let turned = depths.len() / 60 % 2 == 1;
-                    let step = 1.96 * factor * (z + 1.0) * if turned { -0.9 } else { 1.0 };
-                    depths.push(z + step);
+            let point = |at: usize| {
+                let (x, y) = (at % width, at / width);
+                let steps = if along < 0.0 { height - y } else { y } as f32;
+                let z = depths[(across * x as f32 + f32::abs(along) * steps) as usize];
+                [(x as f32 - 50.0) / 60.0 * z, (y as f32 - 45.0) / 60.0 * z, z]
+            };
+            let cloud = Cloud { width, height, points: (0..width * height).map(point).collect() };
+            for (method, border_policy) in methods() {
+                if method != Method::AverageDepthChange {
+                    continue;
                 }
-                let point = |at: usize| {
-                    let (x, y) = (at % width, at / width);
-                    let steps = if along < 0.0 { height - y } else { y } as f32;
-                    let z = depths[(across * x as f32 + f32::abs(along) * steps) as usize];
-                    [(x as f32 - 50.0) / 60.0 * z, (y as f32 - 45.0) / 60.0 * z, z]
-                };
-                let cloud =
-                    Cloud { width, height, points: (0..width * height).map(point).collect() };
-                for (method, border_policy) in methods() {
-                    if method == Method::AverageDepthChange {
-                        let mut options = options((method, border_policy), smoothing, false);
-                        options.max_depth_change_factor = factor;
-                        worst.check(&cloud, "steep", &options);
-                    }
+                for smoothing in SMOOTHING {
+                    let mut options = options((method, border_policy), smoothing, false);
+                    options.max_depth_change_factor = factor;
+                    worst.check(&cloud, "steep", &options);
                 }
             }
         }

@@ -172,7 +172,8 @@ fn spacing(points: &Points) -> f32 {
     let places = |size: usize| (1..SAMPLES).map(move |i| i * size / SAMPLES);
     let pixels = places(points.height()).flat_map(|y| places(points.width()).map(move |x| (x, y)));
     let apart = pixels.map(|(x, y)| {
-        let (a, b) = (points.at(x.max(1) - 1, y), points.at(x.max(1), y));
+        let x = x.max(1);
+        let (a, b) = (points.at(x - 1, y), points.at(x, y));
         (0..3).map(|c| (a[c] - b[c]) * (a[c] - b[c])).sum::<f32>().sqrt()
     });
     let (mut sorted, mut count) = ([0.0; (SAMPLES - 1) * (SAMPLES - 1)], 0);

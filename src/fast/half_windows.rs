@@ -26,12 +26,8 @@ pub(crate) struct HalfWindows<T> {
     doubt: f32,
     /// By half of the side of a window.
     places: Vec<Places>,
-    /// In the ring of points, the rows around the one aimed at.
-    rows: [usize; 3],
-}
-
-fn points_in_half(side: usize) -> usize {
-    (side / 2) * (side / 2)
+    /// In the ring of points, the rows above and below the one aimed at.
+    rows: [usize; 2],
 }
 
 /// Horizontal and vertical tangent.
@@ -54,8 +50,9 @@ struct Places {
 }
 
 impl Places {
-    fn of(frame: &Frame, y: usize, side: usize, scale: f32) -> Self {
-        let (half, quarter) = ((side / 2) as isize, (side / 4) as isize);
+    fn of(frame: &Frame, y: usize, half: usize, scale: f32) -> Self {
+        let share = 1.0 / ((half * half) as f32 * scale);
+        let (half, quarter) = (half as isize, (half / 2) as isize);
         // Integrals end before a half window and with it.
         let ends = |first: isize| [first - 1, first + half - 1];
         let half_window = |x: isize, row: isize| frame.corners(1, y, ends(row), ends(x));
@@ -69,7 +66,7 @@ impl Places {
                 half_window(-quarter, -half),
                 half_window(-quarter, 1),
             ],
-            share: 1.0 / (points_in_half(side) as f32 * scale),
+            share,
             ends: [
                 [point(-quarter - 1, 0), point(quarter + 1, 0)],
                 [point(-1, -quarter), point(1, quarter)],
@@ -151,8 +148,8 @@ impl<T: Depth> Sums for HalfWindows<T> {
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
         let scale = self.scale;
         self.places.clear();
-        self.places.extend((0..=side / 2).map(|half| Places::of(frame, y, 2 * half, scale)));
-        self.rows = std::array::from_fn(|row| frame.start(3, (y + row).wrapping_sub(1)));
+        self.places.extend((0..=side / 2).map(|half| Places::of(frame, y, half, scale)));
+        self.rows = [y.wrapping_sub(1), y + 1].map(|row| frame.start(3, row));
     }
 
     #[inline(always)]
@@ -228,10 +225,10 @@ impl<T: Depth> BySide for HalfWindows<T> {
         // SAFETY: as the caller's: rows and columns are held, and so are the lanes from these columns on.
         unsafe {
             let mut tangents = if half == 1 {
-                let z = planes.as_ptr().add(x + 2 * frame.stride);
-                let at = |row: usize| Floats::<S>::load(z.wrapping_add(self.rows[row]));
-                let next = |x: isize| Floats::load(z.wrapping_add(self.rows[1]).wrapping_offset(x));
-                [[next(1) - next(-1); 3], [at(2) - at(0); 3]]
+                let plane = planes.as_ptr().add(x + 2 * frame.stride);
+                let z = |place: usize| Floats::<S>::load(plane.wrapping_add(place));
+                let ([left, right], [above, below]) = (ends[0], self.rows);
+                [[z(right) - z(left); 3], [z(below) - z(above); 3]]
             } else {
                 let ring = self.integrals.as_ptr().add(x);
                 let [left, right, up, down] = halves;
