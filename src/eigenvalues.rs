@@ -8,6 +8,7 @@ use crate::cloud::Points;
 use crate::eigen::{Scatter, Symmetric3, eigen};
 use crate::methods::finite_point;
 use crate::paper::{ROUNDING, Rect, SummedArea};
+use crate::threads::Workers;
 
 /// Rows of a band at least: those that its windows reach around it are summed with it.
 const BAND_ROWS: usize = 64;
@@ -60,7 +61,7 @@ impl Band {
         let origin =
             whole.pixels().find_map(|pixel| finite_point(points, pixel)).unwrap_or_default();
         self.top = rows.start;
-        self.sums.sum_up(width, rows.len(), |(x, y)| {
+        self.sums.sum_up(width, rows.len(), &Workers::default(), |(x, y)| {
             finite_point(points, (x, y + rows.start)).map_or([0.0; 10], |point| {
                 let [x, y, z]: [f64; 3] = std::array::from_fn(|i| point[i] - origin[i]);
                 [1.0, x, y, z, x * x, x * y, x * z, y * y, y * z, z * z]

@@ -141,28 +141,15 @@ impl Estimator {
             }
         }
         let width = points.width();
-        let write = |estimate: &dyn Fn(usize) -> Estimate| match indices {
-            None => {
-                for (y, x) in (0..points.height()).flat_map(|y| (0..width).map(move |x| (y, x))) {
-                    let Estimate { normal, curvature } = estimate(y * width + x);
-                    // SAFETY: the sizes are equal, and no other thread is at work.
-                    unsafe { normals.write(x, y, normal, curvature) };
-                }
-            }
-            Some(indices) => {
-                for (k, &index) in indices.iter().enumerate() {
-                    let Estimate { normal, curvature } = estimate(index as usize);
-                    // SAFETY: `normals` has an element for every index, and no other thread is at work.
-                    unsafe { normals.write(k, 0, normal, curvature) };
-                }
-            }
-        };
         if self.options.is_beyond_pcl() {
-            let estimates = self.estimates(points)?;
-            write(&|pixel| estimates[pixel].into());
+            self.second_pass(points)?;
+            let Estimator { options, scratch, cloud, second_pass, .. } = &*self;
+            let estimate = |pixel| second_pass.estimate(cloud, options, pixel);
+            write(normals, indices, width, scratch.workers(), estimate);
         } else {
             let plain = Plain::new(points, &self.options)?;
-            write(&|pixel| plain.estimate(pixel % width, pixel / width));
+            let estimate = |pixel: usize| plain.estimate(pixel % width, pixel / width);
+            write(normals, indices, width, &Workers::default(), estimate);
         }
         Ok(())
     }
@@ -281,8 +268,8 @@ impl Estimator {
         self.options.zero_is_missing.then(cleaned).transpose()
     }
 
-    /// All pixels' estimates where PCL's windows and sums alone are not what is asked for.
-    fn estimates(&mut self, points: &Points) -> Result<&[[f32; 4]], Error> {
+    /// Computes what the estimates are made from where PCL's windows and sums alone are not what is asked for.
+    fn second_pass(&mut self, points: &Points) -> Result<(), Error> {
         let is_plain = self.is_plain(points);
         let Estimator { options, isa, scratch, cloud, second_pass } = self;
         scratch.prepare(options.threads)?;
@@ -292,7 +279,7 @@ impl Estimator {
         let cleaned = is_pcl.then(|| packed(&cloud.points, cloud.width, cloud.height));
         let points = cleaned.as_ref().unwrap_or(points);
         let mut engine = Engine { points, options, isa: *isa, scratch, is_plain };
-        second_pass.estimates(cloud, options, &mut engine)
+        second_pass.compute(cloud, options, &mut engine)
     }
 
     /// How much scratch memory is held, in bytes.
@@ -305,6 +292,29 @@ impl Estimator {
         self.scratch = Scratch::default();
         self.cloud = Cloud::default();
         self.second_pass = SecondPass::default();
+    }
+}
+
+/// Writes the estimates of the pixels that `indices` list, or of all pixels of an image of this width.
+fn write(
+    normals: &Normals,
+    indices: Option<&[i32]>,
+    width: usize,
+    workers: &Workers,
+    estimate: impl Fn(usize) -> Estimate + Sync,
+) {
+    let put = |x: usize, y: usize, pixel: usize| {
+        let Estimate { normal, curvature } = estimate(pixel);
+        // SAFETY: there is an element for every index, or for every pixel, which falls to one thread.
+        unsafe { normals.write(x, y, normal, curvature) };
+    };
+    match indices {
+        None => workers.for_each(normals.height(), |_, y| {
+            (0..width).for_each(|x| put(x, y, y * width + x));
+        }),
+        Some(indices) => {
+            indices.iter().enumerate().for_each(|(k, index)| put(k, 0, *index as usize));
+        }
     }
 }
 

@@ -50,23 +50,6 @@ impl Workers {
         parts.into_inner().unwrap_or_else(PoisonError::into_inner).1
     }
 
-    /// Fills a table, rows of `width` elements, with the values of their columns and rows.
-    pub fn fill<T: Send>(
-        &self,
-        table: &mut [T],
-        width: usize,
-        value: impl Fn(usize, usize) -> T + Sync,
-    ) -> Result<(), Error> {
-        self.share(table.chunks_mut(width).enumerate(), |rows| {
-            for (y, row) in rows {
-                for (x, to) in row.iter_mut().enumerate() {
-                    *to = value(x, y);
-                }
-            }
-            Ok(())
-        })
-    }
-
     /// Calls `work(worker, item)` for every item; no two calls run at once with the same worker.
     pub fn for_each(&self, items: usize, work: impl Fn(usize, usize) + Sync) {
         let Some(pool) = &self.pool else { return (0..items).for_each(|item| work(0, item)) };

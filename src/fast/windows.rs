@@ -379,7 +379,7 @@ unsafe fn widened<S: Simd>([least, largest]: [S::F; 2], z: S::F, finite: S::F) -
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn threshold<S: Simd>(z: S::F, factor: S::F) -> S::F {
+pub(super) unsafe fn threshold<S: Simd>(z: S::F, factor: S::F) -> S::F {
     // SAFETY: as the caller's.
     unsafe { S::mul(S::mul(factor, S::add(S::abs(z), S::splat(1.0))), S::splat(2.0)) }
 }

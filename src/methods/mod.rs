@@ -72,7 +72,8 @@ pub(crate) fn start(center: usize, side: usize) -> isize {
 
 #[inline(always)]
 pub(crate) fn is_finite(point: [f32; 3]) -> bool {
-    point.iter().all(|c| c.is_finite())
+    let [x, y, z] = point.map(f32::is_finite);
+    x & y & z
 }
 
 /// A pixel's point in double precision, if it is finite.

@@ -35,11 +35,19 @@ impl Cloud {
         (self.width, self.height) = (width, height);
         let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
         resize(&mut self.points, width * height, [f32::NAN; 3])?;
-        workers.fill(&mut self.points, width, |x, y| cleaned.at(x, y))?;
+        resize(&mut self.depths, width * height, f32::NAN)?;
         let range = options.semantics == Semantics::Paper && options.paper.depth == Depth::Range;
         let depth = |[x, y, z]: [f32; 3]| if range { (x * x + y * y + z * z).sqrt() } else { z };
-        resize(&mut self.depths, width * height, f32::NAN)?;
-        workers.fill(&mut self.depths, width, |x, y| depth(self.points[y * width + x]))
+        let rows = self.points.chunks_mut(width).zip(self.depths.chunks_mut(width)).enumerate();
+        workers.share(rows, |share| {
+            for (y, (points, depths)) in share {
+                for (x, (to, of_to)) in points.iter_mut().zip(depths).enumerate() {
+                    *to = cleaned.at(x, y);
+                    *of_to = depth(*to);
+                }
+            }
+            Ok(())
+        })
     }
 
     /// Bytes held.
@@ -53,6 +61,12 @@ impl Cloud {
 
     pub fn is_missing(&self, at: usize) -> bool {
         self.depths[at].is_nan()
+    }
+
+    /// How many pixels before this one in its row, axis 0, or in its column the last finite one is.
+    pub fn gap(&self, at: usize, axis: usize) -> Option<usize> {
+        let [before, step] = [[at % self.width, 1], [at / self.width, self.width]][axis];
+        (1..=before).find(|gap| !self.is_missing(at - gap * step))
     }
 }
 

@@ -4,6 +4,7 @@ use super::blocks::{BLOCK, Blocks};
 use super::rect::Rect;
 use super::summed_area::SummedArea;
 use crate::Error;
+use crate::threads::Workers;
 
 /// Integral images of the first pass' normals, block by block.
 #[derive(Debug, Default)]
@@ -13,8 +14,13 @@ pub(crate) struct SummedNormals {
 
 impl SummedNormals {
     /// Sums other normals.
-    pub fn sum(&mut self, estimates: &[[f32; 4]], blocks: &Blocks) -> Result<(), Error> {
-        self.sums.sum_up(blocks.across, blocks.down, |place| {
+    pub fn sum(
+        &mut self,
+        estimates: &[[f32; 4]],
+        blocks: &Blocks,
+        workers: &Workers,
+    ) -> Result<(), Error> {
+        self.sums.sum_up(blocks.across, blocks.down, workers, |place| {
             let mut sum = [0.0; 4];
             for at in blocks.pixels(place) {
                 let [x, y, z, _] = estimates[at].map(f64::from);

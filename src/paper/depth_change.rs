@@ -32,30 +32,39 @@ pub(crate) struct DepthChanges {
 impl DepthChanges {
     /// The changes of a cloud: `is_change(depth, difference, gap)` says whether a difference in depth to the
     /// neighbour `gap` pixels to the right or below is one; no NaN is.
-    pub fn find(cloud: &Cloud, is_change: impl Fn(f32, f32, usize) -> bool) -> Result<Self, Error> {
+    pub fn find(
+        cloud: &Cloud,
+        workers: &Workers,
+        is_change: impl Fn(f32, f32, usize) -> bool + Sync,
+    ) -> Result<Self, Error> {
         let (width, height) = (cloud.width, cloud.height);
         let mut right = table(repeat_n(false, width * height))?;
         let mut below = table(repeat_n(false, width * height))?;
-        // The last finite depth of the row, and of every column, and where it was; the first are compared with NaN.
-        let mut lowest = table(repeat_n((0, f32::NAN), width))?;
-        for y in 0..height {
-            let mut last = (0, f32::NAN);
-            let first = y * width;
-            for (x, depth) in cloud.depths[first..first + width].iter().enumerate() {
-                if depth.is_nan() {
-                    continue;
+        let depths = &cloud.depths;
+        let rows = right.chunks_mut(width).zip(below.chunks_mut(width)).enumerate();
+        workers.share(rows, |rows| {
+            for (y, (right, below)) in rows {
+                let (row, next) = (y * width, (y + 1) * width);
+                // To the pixels behind them in their row, axis 0, and in their columns.
+                let behind = [row + 1..next, next..(next + width).min(depths.len())];
+                for (axis, (changes, behind)) in [right, below].into_iter().zip(behind).enumerate()
+                {
+                    let pairs = depths[row..next].iter().zip(&depths[behind.clone()]);
+                    for (to, (before, depth)) in changes.iter_mut().zip(pairs.clone()) {
+                        *to = is_change(*before, depth - before, 1);
+                    }
+                    for ((to, at), (before, depth)) in changes.iter_mut().zip(behind).zip(pairs) {
+                        if before.is_nan() & !depth.is_nan() {
+                            *to = cloud.gap(at, axis).is_some_and(|gap| {
+                                let before = depths[at - gap * [1, width][axis]];
+                                is_change(before, depth - before, gap)
+                            });
+                        }
+                    }
                 }
-                let is_change =
-                    |(from, before): (usize, f32), at| is_change(before, depth - before, at - from);
-                if is_change(last, x) {
-                    right[first + x - 1] = true;
-                }
-                if is_change(lowest[x], y) {
-                    below[first + x - width] = true;
-                }
-                (last, lowest[x]) = ((x, *depth), (y, *depth));
             }
-        }
+            Ok(())
+        })?;
         Ok(DepthChanges { width, height, right, below })
     }
 
@@ -66,11 +75,11 @@ impl DepthChanges {
 
     /// Without the changes that the slope of the surface on both sides explains: on a steep surface neighbours are
     /// as far apart as across an edge.
-    pub fn not_explained(&self, cloud: &Cloud, workers: &Workers) -> Result<DepthChanges, Error> {
+    pub fn not_explained(mut self, cloud: &Cloud, workers: &Workers) -> Result<Self, Error> {
         /// How far the surface is looked at along and across a change, in pixels.
         const ALONG: usize = 5;
         const ACROSS: usize = 2;
-        let Self { width, height, .. } = *self;
+        let Self { width, height, .. } = self;
         let inverse = |at: usize| f64::from(inverse_depth(cloud.depths[at]));
         // `at` is the last pixel before the change.
         let is_explained = |axis: usize, at: usize| {
@@ -79,9 +88,7 @@ impl DepthChanges {
             let (i, j) = (pixel[axis], pixel[1 - axis]);
             let [step, length, lines] = [[1, width, height], [width, height, width]][axis];
             let next = at + step;
-            let Some(gap) = (1..=i + 1).find(|gap| !cloud.is_missing(next - gap * step)) else {
-                return false;
-            };
+            let Some(gap) = cloud.gap(next, axis) else { return false };
             let jump = (inverse(next) - inverse(next - gap * step)).abs();
             let rect = |along: Range<usize>| {
                 let across = j.saturating_sub(ACROSS)..(j + ACROSS + 1).min(lines);
@@ -98,16 +105,17 @@ impl DepthChanges {
             let mut sides = [before, after].into_iter().filter_map(is_steep);
             sides.next() == Some(true) && sides.all(|is_steep| is_steep)
         };
-        let left = |axis: usize, changes: &[bool]| {
-            let mut left = table(repeat_n(false, changes.len()))?;
-            workers.fill(&mut left, width, |x, y| {
-                let at = y * width + x;
-                changes[at] && !is_explained(axis, at)
+        for (axis, changes) in [&mut self.right, &mut self.below].into_iter().enumerate() {
+            workers.share(changes.chunks_mut(width).enumerate(), |rows| {
+                for (y, row) in rows {
+                    for (x, change) in row.iter_mut().enumerate().filter(|(_, change)| **change) {
+                        *change = !is_explained(axis, y * width + x);
+                    }
+                }
+                Ok(())
             })?;
-            Ok::<_, Error>(left)
-        };
-        let (right, below) = (left(0, &self.right)?, left(1, &self.below)?);
-        Ok(DepthChanges { width, height, right, below })
+        }
+        Ok(self)
     }
 
     /// The largest radius around every pixel, row by row, of a window in which no two neighbours are a depth change
@@ -122,16 +130,15 @@ impl DepthChanges {
             }
         };
         let around = |at: usize, size: usize| at.saturating_sub(1)..(at + 2).min(size);
-        for (at, (right, below)) in self.right.iter().zip(&self.below).enumerate() {
-            if !(*right || *below) {
-                continue;
-            }
-            let (x, y) = (at % width, at / width);
-            if *right {
-                spoil(x..x + 2, around(y, height));
-            }
-            if *below {
-                spoil(around(x, width), y..y + 2);
+        let rows = self.right.chunks(width).zip(self.below.chunks(width)).enumerate();
+        for (y, (right, below)) in rows {
+            for x in (0..width).filter(|x| right[*x] | below[*x]) {
+                if right[x] {
+                    spoil(x..x + 2, around(y, height));
+                }
+                if below[x] {
+                    spoil(around(x, width), y..y + 2);
+                }
             }
         }
         least_steps(&spoilt, width, height, 1, 1)

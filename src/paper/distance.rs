@@ -82,6 +82,20 @@ fn chamfer(changes: &[bool], width: usize, height: usize) -> Result<Vec<f32>, Er
 /// What [`least_steps`] gives where there is no pixel to come from, or more.
 const FAR: u32 = u32::MAX / 2;
 
+#[inline(always)]
+fn step(to: &mut u32, from: u32, weight: u32) {
+    *to = (*to).min(from + weight);
+}
+
+/// The steps along a row, in the order of its pixels.
+#[inline(always)]
+fn along<'a>(row: impl Iterator<Item = &'a mut u32>, straight: u32) {
+    row.fold(FAR, |before, to| {
+        step(to, before, straight);
+        *to
+    });
+}
+
 /// The least weight of the steps along rows and columns and along diagonals that lead to every pixel from one of the
 /// `starts`, in two passes.
 pub(crate) fn least_steps(
@@ -92,7 +106,6 @@ pub(crate) fn least_steps(
     diagonal: u32,
 ) -> Result<Vec<u32>, Error> {
     let mut map = table(starts.iter().map(|&start| if start { 0 } else { FAR }))?;
-    let step = |to: &mut u32, from: u32, weight: u32| *to = (*to).min(from + weight);
     let from_next_row = |row: &mut [u32], next: &[u32]| {
         row.iter_mut().zip(next).for_each(|(to, from)| step(to, *from, straight));
         row[1..].iter_mut().zip(next).for_each(|(to, from)| step(to, *from, diagonal));
@@ -103,20 +116,14 @@ pub(crate) fn least_steps(
         if y > 0 {
             from_next_row(row, &above[(y - 1) * width..]);
         }
-        for x in 1..width {
-            let from = row[x - 1];
-            step(&mut row[x], from, straight);
-        }
+        along(row[..width].iter_mut(), straight);
     }
     for y in (0..height).rev() {
         let (row, below) = map[y * width..].split_at_mut(width);
         if y + 1 < height {
             from_next_row(row, &below[..width]);
         }
-        for x in (1..width).rev() {
-            let from = row[x];
-            step(&mut row[x - 1], from, straight);
-        }
+        along(row.iter_mut().rev(), straight);
     }
     Ok(map)
 }

@@ -44,6 +44,7 @@ use crate::eigenvalues::eigenvalue_map;
 use crate::memory::table;
 use crate::methods::Estimate;
 use crate::options::{Options, Semantics};
+use crate::threads::Workers;
 
 /// The maps of [`Semantics::Paper`], row by row.
 pub(crate) struct PaperMaps {
@@ -61,7 +62,7 @@ impl PaperMaps {
     pub fn new(points: &Points, options: &Options) -> Result<Self, Error> {
         let cloud = Cloud::new(points, options)?;
         let paper = &options.paper;
-        let depth_changes = depth_changes(&cloud, options)?.map()?;
+        let depth_changes = depth_changes(&cloud, options, &Workers::default())?.map()?;
         let distances = distance::distance_map(
             &depth_changes,
             cloud.width,
@@ -116,9 +117,15 @@ pub(crate) fn estimate_window(
     methods::estimate(options.method, &cleaned, &rect)
 }
 
-fn depth_changes(cloud: &Cloud, options: &Options) -> Result<DepthChanges, Error> {
-    DepthChanges::find(cloud, |depth, difference, gap| {
-        is_depth_change(depth, difference, gap, options)
+fn depth_changes(
+    cloud: &Cloud,
+    options: &Options,
+    workers: &Workers,
+) -> Result<DepthChanges, Error> {
+    // A copy: what is found is not written to it, and loops are vectorized.
+    let options = options.clone();
+    DepthChanges::find(cloud, workers, |depth, difference, gap| {
+        is_depth_change(depth, difference, gap, &options)
     })
 }
 

@@ -50,7 +50,7 @@ pub(crate) trait Engine {
 /// The tables of the image, kept from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct SecondPass {
-    /// The first pass' windows and estimates; those then as they should be.
+    /// The first pass' windows and estimates.
     sizes: Vec<u32>,
     estimates: Vec<[f32; 4]>,
     normals: SummedNormals,
@@ -87,22 +87,21 @@ impl SecondPass {
             + bytes(&self.second)
     }
 
-    /// The estimates of all pixels, row by row, turned to the viewpoint: near depth changes and near creases from
-    /// even windows, as the options ask.
-    pub fn estimates(
+    /// Makes what [`SecondPass::estimate`] gives those of other points.
+    pub fn compute(
         &mut self,
         cloud: &Cloud,
         options: &Options,
         engine: &mut impl Engine,
-    ) -> Result<&[[f32; 4]], Error> {
+    ) -> Result<(), Error> {
         engine.windows(&mut self.sizes, &mut self.estimates)?;
-        if !(options.one_sided_windows || options.crease_windows) {
-            return Ok(&self.estimates);
+        if !asks(options) {
+            return Ok(());
         }
         let blocks = Blocks::of(cloud.width, cloud.height);
         self.concern(cloud, &blocks, options, engine.workers())?;
         let SecondPass { wanted, levels, windows, choices, taken, second, .. } = self;
-        let clean = depth_changes(cloud, options)?;
+        let clean = depth_changes(cloud, options, engine.workers())?;
         let clean = clean.not_explained(cloud, engine.workers())?.clean_radii()?;
         let least_noise = Asked::least_noise(options.paper.alpha);
         let limit = options.paper.largest_radius;
@@ -111,12 +110,13 @@ impl SecondPass {
         let even = EvenWindows { cloud, asked: &asked, options, windows };
         engine.choices(&even, choices)?;
         refill(taken, repeat_n(0, blocks.count()))?;
-        for block in choices.iter().flatten().map(|block| *block as usize) {
-            taken[block] = even.radius(block);
+        for block in choices.iter().flatten() {
+            taken[*block as usize] = 1;
         }
-        engine.of_blocks(&blocks, taken, second)?;
-        self.replace(cloud, options, engine.workers())?;
-        Ok(&self.estimates)
+        for (block, radius) in taken.iter_mut().enumerate().filter(|(_, taken)| **taken > 0) {
+            *radius = even.radius(block);
+        }
+        engine.of_blocks(&blocks, taken, second)
     }
 
     /// Finds the pixels that another window may serve better than their own.
@@ -129,7 +129,7 @@ impl SecondPass {
     ) -> Result<(), Error> {
         let SecondPass { estimates, sizes, wanted, concerned, levels, normals, .. } = self;
         if options.crease_windows {
-            normals.sum(estimates, blocks)?;
+            normals.sum(estimates, blocks, workers)?;
         }
         refill(concerned, repeat_n(false, sizes.len()))?;
         refill(wanted, repeat_n(0, blocks.count()))?;
@@ -171,49 +171,41 @@ impl SecondPass {
         })
     }
 
-    /// Gives the pixels concerned the estimates of the windows that they take.
-    fn replace(
-        &mut self,
-        cloud: &Cloud,
-        options: &Options,
-        workers: &Workers,
-    ) -> Result<(), Error> {
-        let SecondPass { estimates, concerned, choices, second, .. } = self;
-        let replace = |at: usize, estimate: &mut [f32; 4]| {
-            let around = || {
-                let pixel = (at % cloud.width, at / cloud.width);
-                let same = |depth: f32, difference: f32, distance: usize| {
-                    !is_depth_change(depth, difference, distance.max(1), options)
-                };
-                let has_none = options.one_sided_windows && estimate[0].is_nan();
-                has_none.then(|| surroundings::plane_around(cloud, pixel, same)).flatten()
-            };
-            let found = match choices[at].map(|block| second[block as usize]) {
-                Some(found) if !found[0].is_nan() => found,
-                _ => match around() {
-                    Some(found) => found.into(),
-                    None => return,
-                },
-            };
-            let [x, y, z, curvature] = found;
-            let normal = turn_to_viewpoint([x, y, z], cloud.points[at], options.viewpoint);
-            *estimate = Estimate { normal, curvature }.into();
+    /// The estimate of a pixel, turned to the viewpoint: near depth changes and near creases from even windows, as the
+    /// options ask.
+    #[inline(always)]
+    pub fn estimate(&self, cloud: &Cloud, options: &Options, at: usize) -> Estimate {
+        let first = self.estimates[at];
+        if !(asks(options) && self.concerned[at]) {
+            return first.into();
+        }
+        let of_choice = self.choices[at].map(|block| self.second[block as usize].into());
+        let of_choice = of_choice.filter(|found: &Estimate| !found.normal[0].is_nan());
+        let Some(Estimate { normal, curvature }) =
+            of_choice.or_else(|| around(cloud, options, at, first))
+        else {
+            return first.into();
         };
-        let rows = estimates.chunks_mut(cloud.width).enumerate();
-        workers.share(rows, |share| {
-            for (row, estimates) in share {
-                for (at, estimate) in (row * cloud.width..).zip(estimates) {
-                    if concerned[at] {
-                        replace(at, estimate);
-                    }
-                    if options.method != Method::CovarianceMatrix {
-                        estimate[3] = f32::NAN;
-                    }
-                }
-            }
-            Ok(())
-        })
+        let normal = turn_to_viewpoint(normal, cloud.points[at], options.viewpoint);
+        let has_curvature = options.method == Method::CovarianceMatrix;
+        Estimate { normal, curvature: if has_curvature { curvature } else { f32::NAN } }
     }
+}
+
+/// The estimate of a pixel that has none so far and no choice, from the points next to it.
+#[cold]
+fn around(cloud: &Cloud, options: &Options, at: usize, first: [f32; 4]) -> Option<Estimate> {
+    let pixel = (at % cloud.width, at / cloud.width);
+    let same = |depth: f32, difference: f32, distance: usize| {
+        !is_depth_change(depth, difference, distance.max(1), options)
+    };
+    let has_none = options.one_sided_windows && first[0].is_nan();
+    has_none.then(|| surroundings::plane_around(cloud, pixel, same)).flatten()
+}
+
+/// Whether the options ask for a second pass.
+fn asks(options: &Options) -> bool {
+    options.one_sided_windows || options.crease_windows
 }
 
 /// The size that the window of a pixel has far from any depth change, as [`Engine::windows`] gives them; 0 at a

@@ -5,6 +5,7 @@ use std::iter::repeat_n;
 use super::rect::Rect;
 use crate::Error;
 use crate::memory::{bytes, refill};
+use crate::threads::Workers;
 
 /// What rounding on the path to a sum may gather, in units of the largest sum on it.
 pub(crate) const ROUNDING: f64 = 4.0 * f64::EPSILON;
@@ -22,19 +23,30 @@ impl<const N: usize> SummedArea<N> {
         &mut self,
         width: usize,
         height: usize,
-        value: impl Fn((usize, usize)) -> [f64; N],
+        workers: &Workers,
+        value: impl Fn((usize, usize)) -> [f64; N] + Sync,
     ) -> Result<(), Error> {
         let stride = width + 1;
         self.stride = stride;
         refill(&mut self.sums, repeat_n([0.0; N], stride * (height + 1)))?;
-        for y in 0..height {
-            let (above, row) = self.sums[y * stride..].split_at_mut(stride);
-            let mut along = [0.0; N];
-            for (x, (to, above)) in row[1..stride].iter_mut().zip(&above[1..]).enumerate() {
-                let value = value((x, y));
+        workers.share(self.sums[stride..].chunks_mut(stride).enumerate(), |rows| {
+            for (y, row) in rows {
+                let mut along = [0.0; N];
+                for (x, to) in row[1..].iter_mut().enumerate() {
+                    let value = value((x, y));
+                    for i in 0..N {
+                        along[i] += value[i];
+                    }
+                    *to = along;
+                }
+            }
+            Ok(())
+        })?;
+        for y in 1..=height {
+            let (above, row) = self.sums[(y - 1) * stride..].split_at_mut(stride);
+            for (to, above) in row.iter_mut().zip(above) {
                 for i in 0..N {
-                    along[i] += value[i];
-                    to[i] = above[i] + along[i];
+                    to[i] += above[i];
                 }
             }
         }

@@ -4,11 +4,14 @@
 
 use std::iter::repeat_n;
 
+use super::windows::least_depth_change;
 use crate::Error;
 use crate::fast::arithmetic::Floats;
 use crate::fast::lanes::{LANES, Lanes};
 use crate::fast::tile::Bits;
+use crate::fast::windows::threshold;
 use crate::memory::{make_room, refill};
+use crate::options::{Options, Semantics};
 use crate::paper::{
     BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows, JITTER,
     MIDDLE, MISFIT, NEAR, NEAR_NOISE, PLACES, REACH, inverse_depth,
@@ -35,7 +38,7 @@ pub(super) unsafe fn rows<S: Groups>(
         let levels = &even.asked.levels[row * across..][..across];
         make_room(&mut concerned, across)?;
         concerned.extend((0..across).filter(|block| levels[*block] > 0));
-        neighbours.read(even.cloud, row, &concerned)?;
+        neighbours.read(even, row, &concerned)?;
         for (number, blocks) in concerned.chunks(lanes).enumerate() {
             let group = Group { even, row, first: number * lanes, blocks };
             // SAFETY: as the caller's.
@@ -333,24 +336,16 @@ impl Group<'_> {
         [column, row]: [usize; 2],
         choices: &mut [Option<u32>],
     ) {
-        let cloud = self.even.cloud;
         let x = |lane: usize| self.blocks[lane] * BLOCK + column;
-        let pixels = (self.row * BLOCK + row) * cloud.width;
-        let (mut tolerances, mut clean) = (Lanes::ZERO, Lanes::ZERO);
-        let mut there = 0;
-        for lane in (0..self.blocks.len()).take_while(|lane| x(*lane) < cloud.width) {
-            let pixel = pixels + x(lane);
-            there |= u32::from(!cloud.is_missing(pixel)) << lane;
-            clean.0[lane] = self.even.asked.clean[pixel] as f32;
-            tolerances.0[lane] = self.even.tolerance(pixel);
-        }
         // SAFETY: as the caller's.
         unsafe {
-            let noisy = S::and_not(found.exact, S::lt(S::splat(0.0), clean.load::<S>()));
+            let (depth, clean) = neighbours.own::<S>(self.first, [column, row]);
+            let there = S::bits(S::eq(depth, depth));
+            let tolerance = tolerance::<S>(depth, self.even.options);
+            let noisy = S::and_not(found.exact, S::lt(S::splat(0.0), clean));
             let near = neighbours.near::<S>(self.first, [column, row], noisy);
             let (zero, one) = (Floats::splat(0.0), Floats::splat(1.0));
             let [column, row] = [column, row].map(|at| Floats::splat(at as f32 - MIDDLE as f32));
-            let tolerance = Floats(tolerances.load::<S>());
             let near_noise = Floats::splat(NEAR_NOISE) * found.noise / near.points;
             let at_near = [column + near.offset[0], row + near.offset[1]];
             let crease_noise = Floats::splat(CREASE_NOISE) * found.noise;
@@ -444,12 +439,32 @@ impl Axis {
     }
 }
 
-/// The inverse depths of blocks of a row, and of the pixels around them.
+/// `EvenWindows::tolerance`
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn tolerance<S: Simd>(depth: S::F, options: &Options) -> Floats<S> {
+    // SAFETY: as the caller's.
+    unsafe {
+        let least = match options.semantics {
+            Semantics::Paper => least_depth_change::<S>(depth, &options.paper),
+            Semantics::Pcl => threshold::<S>(depth, S::splat(options.max_depth_change_factor)),
+        };
+        Floats(least) / Floats(S::mul(depth, depth)) * Floats::splat(0.5)
+    }
+}
+
+/// Blocks of a row, and the pixels around them, pixel by pixel of a block: so many of each, block by block; NaN outside
+/// the image.
 #[derive(Default)]
 struct Neighbours {
-    /// Row by row and column by column of those pixels, so many of each, block by block; NaN outside the image.
-    inverse_depths: Vec<f32>,
     blocks: usize,
+    /// Of the blocks' own pixels.
+    depths: Vec<f32>,
+    clean: Vec<f32>,
+    /// Of those around them too.
+    inverse_depths: Vec<f32>,
     /// A row of the image, with a column before it, and room behind it for the last block.
     inverse: Vec<f32>,
 }
@@ -459,9 +474,13 @@ const AROUND: usize = BLOCK + 2;
 
 impl Neighbours {
     /// Becomes those of other blocks.
-    fn read(&mut self, cloud: &Cloud, row: usize, blocks: &[usize]) -> Result<(), Error> {
-        let Neighbours { inverse_depths, blocks: length, inverse } = self;
+    fn read(&mut self, even: &EvenWindows, row: usize, blocks: &[usize]) -> Result<(), Error> {
+        let &EvenWindows { cloud, asked, .. } = even;
+        let Neighbours { blocks: length, depths, clean, inverse_depths, inverse } = self;
         *length = blocks.len().next_multiple_of(LANES);
+        for of_own in [&mut *depths, &mut *clean] {
+            refill(of_own, repeat_n(f32::NAN, BLOCK * BLOCK * *length))?;
+        }
         refill(inverse_depths, repeat_n(f32::NAN, AROUND * AROUND * *length))?;
         refill(inverse, repeat_n(f32::NAN, cloud.width + AROUND))?;
         for line in 0..AROUND {
@@ -469,8 +488,9 @@ impl Neighbours {
             if y >= cloud.height {
                 continue;
             }
-            let depths = &cloud.depths[y * cloud.width..][..cloud.width];
-            for (to, depth) in inverse[1..].iter_mut().zip(depths) {
+            let pixels = y * cloud.width..(y + 1) * cloud.width;
+            let (row_depths, row_clean) = (&cloud.depths[pixels.clone()], &asked.clean[pixels]);
+            for (to, depth) in inverse[1..].iter_mut().zip(row_depths) {
                 *to = inverse_depth(*depth);
             }
             for column in 0..AROUND {
@@ -479,8 +499,32 @@ impl Neighbours {
                     *to = inverse[block * BLOCK + column];
                 }
             }
+            if !(1..=BLOCK).contains(&line) {
+                continue;
+            }
+            for column in 0..BLOCK {
+                let to = ((line - 1) * BLOCK + column) * *length;
+                let of_own = depths[to..].iter_mut().zip(&mut clean[to..]);
+                for ((depth, clean), block) in of_own.zip(blocks) {
+                    let x = block * BLOCK + column;
+                    if x < cloud.width {
+                        (*depth, *clean) = (row_depths[x], row_clean[x] as f32);
+                    }
+                }
+            }
         }
         Ok(())
+    }
+
+    /// The depths and the clean radii of the pixels in a column and row of the blocks from the `first` on.
+    ///
+    /// # Safety
+    /// As [`Neighbours::near`].
+    #[inline(always)]
+    unsafe fn own<S: Simd>(&self, first: usize, [column, row]: [usize; 2]) -> (S::F, S::F) {
+        let at = (row * BLOCK + column) * self.blocks + first;
+        // SAFETY: as the caller's; blocks are whole groups.
+        unsafe { (S::load(self.depths[at..].as_ptr()), S::load(self.clean[at..].as_ptr())) }
     }
 
     /// Of the points next to those in a column and row of the blocks from the `first` on; around pixels not in the mask

@@ -265,6 +265,16 @@ unsafe fn smallest_depth_change<S: Simd>(depth: S::F, options: &PaperOptions) ->
     unsafe { S::mul(S::mul(S::splat(options.alpha), depth), depth) }
 }
 
+/// `paper::smoothing_area::least_depth_change`
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+pub(super) unsafe fn least_depth_change<S: Simd>(depth: S::F, options: &PaperOptions) -> S::F {
+    // SAFETY: as the caller's.
+    unsafe { S::mul(S::splat(options.gamma), smallest_depth_change::<S>(depth, options)) }
+}
+
 /// The mask of `paper::smoothing_area::is_depth_change`; false where a depth is NaN.
 ///
 /// # Safety
@@ -278,7 +288,7 @@ unsafe fn is_change<S: Simd>(
 ) -> S::F {
     // SAFETY: as the caller's.
     unsafe {
-        let least = S::mul(S::splat(options.gamma), smallest_depth_change::<S>(depth, options));
+        let least = least_depth_change::<S>(depth, options);
         let (least, difference) = (S::mul(least, gap), S::abs(S::sub(neighbour, depth)));
         S::or(S::lt(least, difference), S::eq(least, difference))
     }
