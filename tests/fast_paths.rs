@@ -218,6 +218,57 @@ fn points_far_off_the_axis_equal_the_plain_form() {
     println!("{worst:?}");
 }
 
+/// A far plane for "no return", and surfaces that go from near to far without a depth change.
+#[test]
+fn depths_orders_of_magnitude_apart_equal_the_plain_form() {
+    let mut worst = Worst::default();
+    let (width, height) = (131, 90);
+    let mut clouds = Vec::new();
+    for (seed, kind) in (0..).zip([Kind::NanBlocks, Kind::Noisy, Kind::Zeros]) {
+        for far in [200.0, 65504.0] {
+            let mut cloud = Cloud::new(kind, width, height, seed);
+            for (at, point) in cloud.points.iter_mut().enumerate() {
+                if !point[2].is_finite() {
+                    let [x, y] = [at % width, at / width].map(|at| at as f32 / 100.0);
+                    *point = [x * far, y * far, far];
+                }
+            }
+            clouds.push((format!("{kind:?}, a plane at {far}"), cloud));
+        }
+    }
+    for (growth, sign) in [(1.03, 1.0), (1.036, -1.0)] {
+        let point = |at: usize| {
+            let (x, y) = (at % width, at / width);
+            let z = (1.4 * f32::powi(growth, (x + y) as i32) - 1.0) * sign;
+            let hole = at.is_multiple_of(97) && y > 20;
+            [x as f32 / 100.0 * z, y as f32 / 100.0 * z, if hole { f32::NAN } else { z }]
+        };
+        let points = (0..width * height).map(point).collect();
+        clouds.push((format!("growing by {growth}"), Cloud { width, height, points }));
+    }
+    for (what, cloud) in &clouds {
+        for method in methods() {
+            for smoothing in [5.0, 10.0, 20.0] {
+                let options = options(method, smoothing, smoothing == 10.0);
+                worst.check(cloud, what, &options);
+                let mut estimator = Estimator::new(options);
+                let all = compute(&mut estimator, cloud);
+                let indices: Vec<i32> = (0..all.len() as i32).rev().step_by(3).collect();
+                let mut listed = vec![[CANARY; 4]; indices.len()];
+                let data = cloud.points.as_flattened();
+                let points = Points::interleaved(data, width, height, 3, 0).unwrap();
+                let to = listed.as_flattened_mut();
+                let mut normals =
+                    Normals::interleaved(to, indices.len(), 1, 4, 0, Some(3)).unwrap();
+                estimator.compute_indices(&points, &indices, &mut normals).unwrap();
+                let expected: Vec<_> = indices.iter().map(|index| all[*index as usize]).collect();
+                assert_same_bits(&expected, &listed, listed.len(), &format!("indices, {what}"));
+            }
+        }
+    }
+    println!("{worst:?}");
+}
+
 /// All but depth changes from each pixel to the next, up and down: what sums of integers that wrap around must still
 /// tell apart.
 #[test]

@@ -6,10 +6,11 @@
 //! the bounds to the counts and 15 %: `... -- print` ends with the table as it should then be. With `IINE_ISA=sse2`
 //! it does so for the other column.
 //!
-//! A cloud far from the camera's origin, as in a map's frame, may take a quarter more.
+//! A cloud far from the camera's origin, as in a map's frame, may take a quarter more; one with a far plane for "no
+//! return", as simulators write, with PCL's semantics three times as many.
 //!
-//! The program runs itself under valgrind: `frames N SEMANTICS METHOD POLICY METRES` computes N frames of a cloud that is
-//! moved to the right by so much. The counts are the difference between two frames and one, so neither start nor the
+//! The program runs itself under valgrind: `frames N SEMANTICS METHOD POLICY METRES PLANE` computes N frames of a cloud
+//! that is moved to the right by so many metres, with a far plane at that depth if it is not 0. The counts are the difference between two frames and one, so neither start nor the
 //! first frame's allocations are in them.
 
 #[path = "../benches/common/mod.rs"]
@@ -42,15 +43,17 @@ const BOUNDS: [(Semantics, Method, BorderPolicy, u64, u64); 10] = [
     (Paper, AverageDepthChange, Ignore, 221, 367),
 ];
 
-/// In metres.
+/// In metres: how far the cloud is moved, and the depth of the far plane.
 const FAR: f32 = 1000.0;
+const PLANE: f32 = 65504.0;
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if arguments.first().is_some_and(|word| word == "frames") {
         let number = |k: usize| arguments[k].parse::<usize>().expect("a number");
         let (method, policy) = (Method::ALL[number(3)], BorderPolicy::ALL[number(4)]);
-        frames(number(1), Semantics::ALL[number(2)], method, policy, number(5) as f32);
+        let scene = [5, 6].map(|k| number(k) as f32);
+        frames(number(1), Semantics::ALL[number(2)], method, policy, scene);
         return ExitCode::SUCCESS;
     }
     if !cfg!(target_arch = "x86_64") {
@@ -82,8 +85,12 @@ fn main() -> ExitCode {
             println!("{verdict} {name}{what}: {count} instructions a pixel, at most {bound}");
             good &= count <= bound;
         };
-        let (far, _) = count(semantics, method, policy, FAR, isa);
-        let (count, stages) = count(semantics, method, policy, 0.0, isa);
+        let count = |scene: [f32; 2]| count(semantics, method, policy, scene, isa);
+        let (far, _) = count([FAR, 0.0]);
+        if semantics == Pcl {
+            check(count([0.0, PLANE]).0, 3 * bound, ", with a far plane");
+        }
+        let (count, stages) = count([0.0; 2]);
         check(count, bound, "");
         check(far, bound + bound / 4, ", far away");
         if printing {
@@ -110,10 +117,14 @@ fn frames(
     semantics: Semantics,
     method: Method,
     border_policy: BorderPolicy,
-    moved: f32,
+    [moved, plane]: [f32; 2],
 ) {
     let mut cloud = Cloud::generated(WIDTH, HEIGHT);
-    for point in cloud.data.chunks_mut(common::POINT) {
+    for (at, point) in cloud.data.chunks_mut(common::POINT).enumerate() {
+        if plane > 0.0 && point[2].is_nan() {
+            let [x, y] = [at % WIDTH, at / WIDTH].map(|at| (at as f32 - 320.0) / 525.0);
+            point[..3].copy_from_slice(&[x * plane, y * plane, plane]);
+        }
         point[0] += moved;
     }
     let mut options = Options::default();
@@ -135,19 +146,20 @@ fn count(
     semantics: Semantics,
     method: Method,
     policy: BorderPolicy,
-    moved: f32,
+    [moved, plane]: [f32; 2],
     isa: Isa,
 ) -> (u64, Vec<(&'static str, u64)>) {
     let started = [1, 2].map(|number| {
-        let output = Path::new(env!("CARGO_TARGET_TMPDIR"))
-            .join(format!("callgrind.{semantics:?}.{method:?}.{policy:?}.{moved}.{number}"));
+        let output = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!(
+            "callgrind.{semantics:?}.{method:?}.{policy:?}.{moved}.{plane}.{number}"
+        ));
         let child = Command::new("valgrind")
             .arg("--tool=callgrind")
             .arg(format!("--callgrind-out-file={}", output.display()))
             .arg(std::env::current_exe().expect("this test's path"))
             .args(["frames", &number.to_string(), &(semantics as i32).to_string()])
             .args([(method as i32).to_string(), (policy as i32).to_string()])
-            .arg(moved.to_string())
+            .args([moved, plane].map(|metres| metres.to_string()))
             .env("IINE_ISA", isa.name())
             .stderr(std::process::Stdio::null())
             .spawn();

@@ -1,8 +1,9 @@
 //! The fast form of the whole method: the same steps as the plain form, over lanes, rows and tiles.
 //!
-//! First the windows of the whole image (`windows`), then tile by tile the points (`planes`), the method's rings of
-//! sums (`strip_pairs`, `strips`, `moments`, `half_windows`) and, run by run (`run`), the normals (`tile`). Tiles are fixed by the
-//! frame and the options, so that results do not depend on the number of threads.
+//! First the windows of the whole image (`windows`), then tile by tile, and if need be layer by layer (`layers`), the
+//! points (`planes`), the method's rings of sums (`strip_pairs`, `strips`, `moments`, `half_windows`) and, run by run
+//! (`run`), the normals (`tile`). Tiles and layers are fixed by the frame and the options, so that results do not depend
+//! on the number of threads.
 
 mod arithmetic;
 mod buffer;
@@ -11,6 +12,7 @@ mod depth;
 mod gradients;
 mod half_windows;
 mod lanes;
+mod layers;
 mod moments;
 pub(crate) mod paper;
 mod paths;
@@ -23,13 +25,13 @@ mod tile;
 mod windows;
 
 use std::ops::{Range, RangeInclusive};
-use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use buffer::Buffer;
 use depth::scale_to_integers;
 use half_windows::HalfWindows;
 use lanes::{LANES, Lanes};
+use layers::{Layer, layers};
 use moments::Moments;
 use paths::Task;
 use planes::{Frame, Planes};
@@ -189,6 +191,28 @@ fn read_map<'r>(
     Ok(())
 }
 
+/// What the sweeps found.
+struct Swept {
+    /// The least and the largest finite depth; infinity and -infinity if there is none.
+    depths: [f32; 2],
+    /// A bound on the windows' sides.
+    side: f32,
+}
+
+impl Swept {
+    /// The largest magnitude of a finite depth.
+    fn deepest(&self) -> f32 {
+        let [least, largest] = self.depths;
+        largest.max(-least).max(0.0)
+    }
+
+    /// No finite depth's magnitude is smaller.
+    fn nearest(&self) -> f32 {
+        let [least, largest] = self.depths;
+        least.max(-largest).max(0.0)
+    }
+}
+
 /// One computation.
 struct Job<'a> {
     isa: Isa,
@@ -223,24 +247,25 @@ pub(crate) fn compute(
     }
     let length = row_length(width);
     let mut reach = job.reach(0.0).max(*last_reach);
-    let (deepest, side, swept) = loop {
+    let (found, swept) = loop {
         share_out(height, count, reach, chunks);
         let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
         rows.grow(swept * length)?;
-        let [deepest, side] = job.sweep(workers, each, chunks, &mut rows[..swept * length]);
-        if chunks.len() == 1 || job.reach(deepest) <= reach {
-            break (deepest, side, swept);
+        let found = job.sweep(workers, each, chunks, &mut rows[..swept * length]);
+        if chunks.len() == 1 || job.reach(found.deepest()) <= reach {
+            break (found, swept);
         }
         // Depths reach farther than in the frame before.
-        reach = job.reach(DEEPER * deepest);
+        reach = job.reach(DEEPER * found.deepest());
     };
+    let deepest = found.deepest();
     *last_reach = reach.min(job.reach(DEEPER * deepest));
 
     let reach = job.reach(deepest);
     let rows = &rows[..swept * length];
     let sides = Sides { rows, width, chunks };
     let sink = Sink::new(normals, indices, width, listed)?;
-    let side = (side as usize).min(width.min(height));
+    let side = (found.side as usize).min(width.min(height));
     if options.method == Method::AverageDepthChange {
         job.scale = scale_to_integers(points, options, deepest, side);
     }
@@ -248,7 +273,8 @@ pub(crate) fn compute(
     for scratch in &each[..count] {
         lock(scratch).reserve(&job, &frame, side)?;
     }
-    job.tiles(workers, each, reach, deepest, sides, &sink);
+    let (layers, count) = layers([found.nearest(), deepest], job.range(), side, options);
+    job.tiles(workers, each, reach, &layers[..count], sides, &sink);
     Ok(())
 }
 
@@ -306,8 +332,7 @@ impl Job<'_> {
     }
 
     // Not inlined, as the next one: profiles and the test of instruction counts tell the two by name.
-    /// Steps 1 to 3: fills the rows with sides of windows. Returns the largest magnitude of a finite depth, and a bound
-    /// on the sides.
+    /// Steps 1 to 3: fills the rows with sides of windows.
     #[inline(never)]
     fn sweep(
         &self,
@@ -315,10 +340,10 @@ impl Job<'_> {
         each: &[Mutex<WorkerScratch>],
         chunks: &[Chunk],
         rows: &mut [Lanes],
-    ) -> [f32; 2] {
+    ) -> Swept {
         let length = row_length(self.image.width);
         let rows = Parts(rows.as_mut_ptr());
-        let largest = [AtomicU32::new(0), AtomicU32::new(0)];
+        let all = Mutex::new(Swept { depths: [f32::INFINITY, f32::NEG_INFINITY], side: 0.0 });
         workers.for_each(chunks.len(), |worker, item| {
             let chunk = &chunks[item];
             let places = chunk.start * length..(chunk.start + chunk.swept.len()) * length;
@@ -328,12 +353,12 @@ impl Job<'_> {
             let task = SweepTask { job: self, chunk, rows, sweep };
             // SAFETY: the processor has the instruction set of the job.
             let swept = unsafe { paths::run(self.isa, task) };
-            // Positive floats are in the order of their bits.
-            for (largest, swept) in largest.iter().zip(swept) {
-                largest.fetch_max(swept.to_bits(), Ordering::Relaxed);
-            }
+            let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
+            let ([least, largest], [other_least, other_largest]) = (all.depths, swept.depths);
+            all.depths = [least.min(other_least), largest.max(other_largest)];
+            all.side = all.side.max(swept.side);
         });
-        largest.map(|bits| f32::from_bits(bits.into_inner()))
+        all.into_inner().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Steps 4 and 5, all tiles.
@@ -343,7 +368,7 @@ impl Job<'_> {
         workers: &Workers,
         each: &[Mutex<WorkerScratch>],
         reach: usize,
-        deepest: f32,
+        layers: &[Layer],
         sides: Sides,
         sink: &Sink,
     ) {
@@ -360,7 +385,7 @@ impl Job<'_> {
                 image: &self.image,
                 columns: column..(column + columns).min(width),
                 rows: row..(row + rows).min(height),
-                deepest,
+                layers,
                 whole_points: self.whole_points,
                 sides,
             };
@@ -369,6 +394,16 @@ impl Job<'_> {
             // SAFETY: the processor has the instruction set of the job, and tiles do not share pixels.
             unsafe { paths::run(self.isa, task) };
         });
+    }
+
+    /// How many times as deep as the nearest points others may be for the method's sums to be fine enough for both:
+    /// found by trying, as more layers take more time.
+    fn range(&self) -> f32 {
+        match self.options.method {
+            Method::AverageDepthChange if self.scale.is_some() => f32::INFINITY,
+            Method::AverageDepthChange => 4096.0,
+            Method::CovarianceMatrix | Method::Average3DGradient | Method::Simple3DGradient => 24.0,
+        }
     }
 
     /// Columns of a tile, if windows reach so far from their pixels.
@@ -389,7 +424,7 @@ impl Job<'_> {
     }
 }
 
-/// The sweeps over one chunk of rows, into the map's rows of the chunk. Gives what [`Job::sweep`] returns, of them.
+/// The sweeps over one chunk of rows, into the map's rows of the chunk.
 struct SweepTask<'a> {
     job: &'a Job<'a>,
     chunk: &'a Chunk,
@@ -398,10 +433,10 @@ struct SweepTask<'a> {
 }
 
 impl Task for SweepTask<'_> {
-    type Output = [f32; 2];
+    type Output = Swept;
 
     #[inline(always)]
-    unsafe fn run<S: Groups>(self) -> [f32; 2] {
+    unsafe fn run<S: Groups>(self) -> Swept {
         let SweepTask { job, chunk, rows, sweep } = self;
         let mut windows = WindowRows::new(job.image.width, rows);
         let swept = (chunk.swept.start, chunk.swept.len());
@@ -409,8 +444,7 @@ impl Task for SweepTask<'_> {
         unsafe {
             let depths = windows.sweep_down::<S::Pair>(job.points, job.options, swept, sweep);
             let side = windows.sweep_up::<S::Pair>(job.points, job.options, swept, depths, sweep);
-            let [least, largest] = depths;
-            [largest.max(-least).max(0.0), side]
+            Swept { depths, side }
         }
     }
 }

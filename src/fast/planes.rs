@@ -145,9 +145,9 @@ pub(crate) struct Planes {
 /// What a row of points was like.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct RowNews {
-    /// A point has a finite z but not a finite x or y: no depth change tells of it.
+    /// A point that is held has a finite z but not a finite x or y: no depth change tells of it.
     pub hidden: bool,
-    /// The largest magnitude of x or y of a finite point, or of the filler.
+    /// The largest magnitude of x or y of a point that is held, or of the filler.
     pub largest: f32,
 }
 
@@ -180,7 +180,8 @@ impl Planes {
         [self.row(frame, 0, y), self.row(frame, 1, y), self.row(frame, 2, y)]
     }
 
-    /// Reads row `y` of the points, with `filler` for missing ones.
+    /// Reads row `y` of the points, with `filler` for missing ones and those whose depths' magnitudes are not between
+    /// these.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
@@ -191,6 +192,7 @@ impl Planes {
         frame: &Frame,
         y: usize,
         whole_points: bool,
+        [least, largest]: [f32; 2],
         filler: [f32; 3],
     ) -> RowNews {
         let start = frame.start(3, y);
@@ -201,17 +203,18 @@ impl Planes {
         // SAFETY: as the caller's; all lanes, and a group behind the columns, lie inside the planes.
         unsafe {
             let (ys, zs) = (xs.add(frame.stride), xs.add(2 * frame.stride));
+            let (near, far) = (S::splat(least), S::splat(largest));
             let mut hidden = S::splat(0.0);
             let mut largest = S::splat(0.0);
             for step in 0..frame.steps::<S>() {
                 let at = step * S::LANES;
                 let [x, y, z] = points.lanes::<S>(at);
-                let finite_z = S::finite(z);
-                let finite = S::and(finite_z, S::and(S::finite(x), S::finite(y)));
-                hidden = S::or(hidden, S::and_not(finite, finite_z));
-                let x = S::select(finite, x, S::splat(filler[0]));
-                let y = S::select(finite, y, S::splat(filler[1]));
-                let z = S::select(finite, z, S::splat(filler[2]));
+                let held_z = S::and(S::lt(near, S::abs(z)), S::lt(S::abs(z), far));
+                let held = S::and(held_z, S::and(S::finite(x), S::finite(y)));
+                hidden = S::or(hidden, S::and_not(held, held_z));
+                let x = S::select(held, x, S::splat(filler[0]));
+                let y = S::select(held, y, S::splat(filler[1]));
+                let z = S::select(held, z, S::splat(filler[2]));
                 largest = S::max(largest, S::max(S::abs(x), S::abs(y)));
                 S::store(xs.add(at), x);
                 S::store(ys.add(at), y);

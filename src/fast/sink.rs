@@ -1,7 +1,7 @@
 //! Where a tile's normals go: to every pixel, or to the places of the pixels that indices list.
 
 use super::lanes::LANES;
-use super::tile::Estimates;
+use super::tile::{Bits, Estimates, all};
 use crate::Error;
 use crate::cloud::Normals;
 use crate::memory::refill;
@@ -48,33 +48,36 @@ impl<'a> Sink<'a> {
         }
     }
 
-    /// Writes the first `count` of some estimates, for the pixels from `(x, y)` on.
+    /// Writes some of the `lanes`' estimates, for the pixels from `(x, y)` on.
     ///
     /// # Safety
     /// The pixels are inside the image, and no other thread writes them; the processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn write<S: Simd>(&self, x: usize, y: usize, count: usize, estimates: &Estimates) {
+    pub unsafe fn write<S: Simd>(&self, x: usize, y: usize, lanes: u32, estimates: &Estimates) {
         const { assert!(S::LANES == LANES) };
         let Estimates { normal: [nx, ny, nz], curvature } = estimates;
         let normal = |lane: usize| [nx[lane], ny[lane], nz[lane]];
         match self {
             // SAFETY: as the caller's.
             Sink::All(normals) => unsafe {
-                if count == LANES {
+                if lanes == all(LANES) {
                     let (nx, ny) = (S::load(nx.as_ptr()), S::load(ny.as_ptr()));
                     let (nz, curvature) = (S::load(nz.as_ptr()), S::load(curvature.as_ptr()));
                     normals.write_lanes::<S>(x, y, [nx, ny, nz, curvature]);
                 } else {
-                    for lane in 0..count {
+                    for lane in Bits(lanes) {
                         normals.write(x + lane, y, normal(lane), curvature[lane]);
                     }
                 }
             },
             Sink::Listed { normals, width, .. } => {
-                for (pixel, element) in self.listed(x, y, count) {
+                for (pixel, element) in self.listed(x, y, LANES) {
                     let lane = *pixel as usize - (y * width + x);
-                    // SAFETY: as the caller's; every listed element is one of the normals.
-                    unsafe { normals.write(*element as usize, 0, normal(lane), curvature[lane]) };
+                    if lanes >> lane & 1 == 1 {
+                        let normal = normal(lane);
+                        // SAFETY: as the caller's; every listed element is one of the normals.
+                        unsafe { normals.write(*element as usize, 0, normal, curvature[lane]) };
+                    }
                 }
             }
         }
@@ -87,6 +90,6 @@ impl<'a> Sink<'a> {
     #[inline(always)]
     pub unsafe fn write_none<S: Simd>(&self, x: usize, y: usize, count: usize) {
         // SAFETY: as the caller's.
-        unsafe { self.write::<S>(x, y, count, &Estimates::NONE) };
+        unsafe { self.write::<S>(x, y, all(count), &Estimates::NONE) };
     }
 }

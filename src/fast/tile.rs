@@ -6,6 +6,7 @@ use std::ops::{Range, RangeInclusive};
 use super::Sides;
 use super::arithmetic::{Floats, dot};
 use super::lanes::LANES;
+use super::layers::Layer;
 use super::planes::{Frame, MARGIN, Planes};
 use super::run::{Noted, RUN};
 use super::sink::Sink;
@@ -128,8 +129,8 @@ pub(crate) struct Tile<'a> {
     /// The pixels to compute; the first column is a multiple of the group.
     pub columns: Range<usize>,
     pub rows: Range<usize>,
-    /// No finite depth's magnitude is larger.
-    pub deepest: f32,
+    /// Those that the tile's pixels are in.
+    pub layers: &'a [Layer],
     pub whole_points: bool,
     pub sides: Sides<'a>,
 }
@@ -153,34 +154,53 @@ impl Tile<'_> {
         // SAFETY: as the caller's.
         let side = unsafe { self.largest_side::<S>() };
         if side == 0 {
-            for y in self.rows.clone() {
-                for x in self.columns.clone().step_by(LANES) {
-                    // SAFETY: as the caller's.
-                    unsafe { sink.write_none::<S::Pair>(x, y, (self.columns.end - x).min(LANES)) };
-                }
-            }
+            // SAFETY: as the caller's.
+            unsafe { self.write_none::<S>(sink) };
             return;
         }
         let size = (self.image.width, self.image.height);
-        *frame = Frame::around(&self.columns, &self.rows, side, size);
-        let origin = self.origin();
-        // Seldom is a point farther from the camera's axis than the deepest one from the camera.
-        let (first, mut limit) =
-            if M::LIMITED { ([0.0; 3], self.deepest) } else { (origin, f32::INFINITY) };
-        sums.start(frame, self.deepest, side, first);
-        loop {
+        if self.layers.len() > 1 {
             // SAFETY: as the caller's.
-            let done = unsafe { self.rows::<S, M>(frame, planes, sums, sink, side, origin, limit) };
-            let Err(BeyondLimit) = done else { break };
-            // SAFETY: as the caller's.
-            let extent = unsafe { self.extent::<S>(frame, planes, origin) };
-            if extent.is_finite() {
-                sums.start(frame, extent, side, origin);
-            } else {
-                // Floats do not hold the way from there.
-                sums.start(frame, f32::MAX, side, [0.0; 3]);
+            unsafe { self.write_none::<S>(sink) };
+        }
+        for layer in self.layers {
+            let Some(origin) = self.origin(layer) else { continue };
+            let side = side.min(layer.side);
+            *frame = Frame::around(&self.columns, &self.rows, side, size);
+            // Seldom is a point farther from the camera's axis than the deepest one from the camera.
+            let (first, mut limit) =
+                if M::LIMITED { ([0.0; 3], layer.deepest) } else { (origin, f32::INFINITY) };
+            sums.start(frame, layer.deepest, side, first);
+            loop {
+                // SAFETY: as the caller's.
+                let done = unsafe {
+                    self.rows::<S, M>(frame, planes, sums, sink, side, layer, origin, limit)
+                };
+                let Err(BeyondLimit) = done else { break };
+                // SAFETY: as the caller's.
+                let extent = unsafe { self.extent::<S>(frame, planes, layer, origin) };
+                if extent.is_finite() {
+                    sums.start(frame, extent, side, origin);
+                } else {
+                    // Floats do not hold the way from there.
+                    sums.start(frame, f32::MAX, side, [0.0; 3]);
+                }
+                limit = f32::INFINITY;
             }
-            limit = f32::INFINITY;
+        }
+    }
+
+    /// Writes NaN to all of the tile's pixels.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn write_none<S: Groups>(&self, sink: &Sink) {
+        for y in self.rows.clone() {
+            for x in self.columns.clone().step_by(LANES) {
+                // SAFETY: as the caller's.
+                unsafe { sink.write_none::<S::Pair>(x, y, (self.columns.end - x).min(LANES)) };
+            }
         }
     }
 
@@ -193,13 +213,15 @@ impl Tile<'_> {
         &self,
         frame: &Frame,
         planes: &mut Planes,
+        layer: &Layer,
         origin: [f32; 3],
     ) -> f32 {
+        let (points, whole_points, held) = (self.points, self.whole_points, layer.held);
         // As bits, which are in the order of positive floats.
         let mut largest = 0;
         for y in frame.rows.clone() {
             // SAFETY: as the caller's.
-            unsafe { planes.push::<S::Widest>(self.points, frame, y, self.whole_points, origin) };
+            unsafe { planes.push::<S::Widest>(points, frame, y, whole_points, held, origin) };
             for (plane, origin) in planes.rows(frame, y).into_iter().zip(origin) {
                 let row = &plane[MARGIN..MARGIN + frame.columns.len()];
                 let bits = row.iter().map(|at| (at - origin).abs().to_bits());
@@ -223,9 +245,11 @@ impl Tile<'_> {
         sums: &mut M,
         sink: &Sink,
         side: usize,
+        layer: &Layer,
         origin: [f32; 3],
         limit: f32,
     ) -> Result<(), BeyondLimit> {
+        let (points, whole_points, held) = (self.points, self.whole_points, layer.held);
         let mut run = Run::default();
         let after = side.div_ceil(2);
         let mut next = frame.rows.start;
@@ -234,7 +258,7 @@ impl Tile<'_> {
             while next < (y + after + 1).min(self.image.height) {
                 // SAFETY: as the caller's.
                 let news = unsafe {
-                    planes.push::<S::Widest>(self.points, frame, next, self.whole_points, origin)
+                    planes.push::<S::Widest>(points, frame, next, whole_points, held, origin)
                 };
                 if news.largest > limit {
                     return Err(BeyondLimit);
@@ -248,7 +272,7 @@ impl Tile<'_> {
             let inner = self.inner(side, y);
             // SAFETY: as the caller's.
             unsafe {
-                self.row::<S, M>(frame, planes, sums, sink, &mut run, y, &inner, hidden);
+                self.row::<S, M>(frame, planes, sums, sink, &mut run, y, &inner, layer, hidden);
             }
         }
         Ok(())
@@ -280,16 +304,24 @@ impl Tile<'_> {
         }
     }
 
-    /// A finite point near the tile's middle: sums about it lose less.
-    fn origin(&self) -> [f32; 3] {
+    /// A finite point of a layer near the tile's middle, if the layer has a window: sums about it lose less.
+    fn origin(&self, layer: &Layer) -> Option<[f32; 3]> {
         let [(left, right), (above, below)] = [&self.columns, &self.rows].map(halves);
         for y in below.chain(above.rev()) {
-            let has_window = |x: &usize| self.sides.row(y)[*x] > 0.0;
+            let has_window =
+                |x: &usize| self.sides.row(y)[*x] > 0.0 && layer.has(self.points.z(*x, y));
             if let Some(x) = right.clone().chain(left.clone().rev()).find(has_window) {
-                return self.points.at(x, y).map(|c| if c.is_finite() { c } else { 0.0 });
+                return Some(self.points.at(x, y).map(|c| if c.is_finite() { c } else { 0.0 }));
             }
         }
-        [0.0; 3]
+        None
+    }
+
+    /// Those of some lanes from pixel `(x, y)` on that are a layer's.
+    #[cold]
+    fn of_layer(&self, layer: &Layer, (x, y): (usize, usize), lanes: u32) -> u32 {
+        let is_own = |lane: &usize| layer.has(self.points.z(x + lane, y));
+        Bits(lanes).filter(is_own).fold(0, |lanes, lane| lanes | 1 << lane)
     }
 
     /// # Safety
@@ -305,6 +337,7 @@ impl Tile<'_> {
         run: &mut Run<M>,
         y: usize,
         inner: &Range<usize>,
+        layer: &Layer,
         hidden: bool,
     ) {
         let row = self.sides.row(y);
@@ -313,10 +346,15 @@ impl Tile<'_> {
             for x in (start..self.columns.end.min(start + RUN)).step_by(LANES) {
                 // SAFETY: as the caller's; a row of sides is readable up to a whole pair of groups.
                 unsafe {
-                    let pair = Pair::new::<S>(self, row, x, y, inner);
+                    let mut pair = Pair::new::<S>(self, row, x, y, inner);
+                    let mut written = all((self.columns.end - x).min(LANES));
+                    if !layer.is_all() {
+                        pair.windows = self.of_layer(layer, (x, y), pair.windows);
+                        written = pair.windows;
+                    }
                     let windows = pair.windows;
                     if windows == 0 {
-                        sink.write_none::<S::Pair>(x, y, (self.columns.end - x).min(LANES));
+                        sink.write::<S::Pair>(x, y, written, &Estimates::NONE);
                         continue;
                     }
                     let at = run.length * LANES;
@@ -325,7 +363,7 @@ impl Tile<'_> {
                     } else {
                         sums.note::<S>(self, frame, planes, &pair, &mut run.sums, at)
                     };
-                    run.places[run.length] = (x, windows);
+                    run.places[run.length] = (x, windows, written);
                     run.lanes[run.length] = windows & !plain;
                     run.length += 1;
                 }
@@ -357,7 +395,7 @@ impl Tile<'_> {
         unsafe {
             of_run.solve::<S>(0, &lanes[..*length]);
             for number in 0..*length {
-                let (x, mut windows) = places[number];
+                let (x, mut windows, written) = places[number];
                 let at = number * LANES;
                 let sides = S::Pair::load(row.as_ptr().add(x));
                 let mut found = sums.estimate::<S::Pair>(of_run, at, sides, false);
@@ -392,8 +430,7 @@ impl Tile<'_> {
                 if plain != 0 {
                     self.plain_lanes(&mut estimates, row, (x, y), plain);
                 }
-                let count = (self.columns.end - x).min(LANES);
-                sink.write::<S::Pair>(x, y, count, &estimates);
+                sink.write::<S::Pair>(x, y, written, &estimates);
             }
         }
     }
@@ -506,8 +543,8 @@ pub(crate) fn contains(range: &Range<usize>, other: RangeInclusive<usize>) -> bo
 /// all of them: what one pixel's step waits for does not hold up the others'.
 struct Run<M: Sums> {
     sums: M::OfRun,
-    /// Where the pairs begin, and the lanes that have a window.
-    places: [(usize, u32); RUN / LANES],
+    /// Where the pairs begin, the lanes that have a window, and those that are written.
+    places: [(usize, u32, u32); RUN / LANES],
     /// The lanes that are not left to the plain form.
     lanes: [u32; RUN / LANES],
     /// In pairs.
@@ -516,7 +553,7 @@ struct Run<M: Sums> {
 
 impl<M: Sums> Default for Run<M> {
     fn default() -> Self {
-        let (places, lanes) = ([(0, 0); RUN / LANES], [0; RUN / LANES]);
+        let (places, lanes) = ([(0, 0, 0); RUN / LANES], [0; RUN / LANES]);
         Run { sums: M::OfRun::default(), places, lanes, length: 0 }
     }
 }
@@ -550,7 +587,7 @@ impl<'a> Pair<'a> {
         let sides = unsafe { S::Pair::load(row.as_ptr().add(x)) };
         // SAFETY: as the caller's.
         let windows = unsafe { S::Pair::bits(S::Pair::lt(S::Pair::splat(0.0), sides)) };
-        Pair { x, y, row, windows: windows & ((1 << count) - 1), inner }
+        Pair { x, y, row, windows: windows & all(count), inner }
     }
 
     /// A lane's pixel and the side of its window.
@@ -596,6 +633,12 @@ impl<'a> Pair<'a> {
     pub fn is_inner(&self, lane: usize, count: usize) -> bool {
         contains(self.inner, self.x + lane..=self.x + lane + count - 1)
     }
+}
+
+/// The mask of the first `count` lanes.
+#[inline(always)]
+pub(crate) fn all(count: usize) -> u32 {
+    (1 << count) - 1
 }
 
 /// The set bits of a mask, lowest first.

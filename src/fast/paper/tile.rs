@@ -10,7 +10,7 @@ use crate::cloud::Points;
 use crate::fast::lanes::LANES;
 use crate::fast::run::{Noted, OfRun, RUN};
 use crate::fast::sink::Sink;
-use crate::fast::tile::{Bits, Estimates};
+use crate::fast::tile::{Bits, Estimates, all};
 use crate::methods::Estimate;
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
@@ -182,7 +182,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 for lane in Bits(plain) {
                     normals.put(lane, self.plain(&cleaned, pixel(lane), &rect(lane)));
                 }
-                sink.write::<S::Pair>(x / step, y / step, count, &normals);
+                sink.write::<S::Pair>(x / step, y / step, all(count), &normals);
             }
         }
     }
