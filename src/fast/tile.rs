@@ -153,16 +153,14 @@ impl Tile<'_> {
     ) {
         // SAFETY: as the caller's.
         let side = unsafe { self.largest_side::<S>() };
-        if side == 0 {
-            // SAFETY: as the caller's.
+        if side == 0 || self.layers.len() > 1 {
+            // SAFETY: as the caller's. One layer of several writes its own pixels only.
             unsafe { self.write_none::<S>(sink) };
+        }
+        if side == 0 {
             return;
         }
         let size = (self.image.width, self.image.height);
-        if self.layers.len() > 1 {
-            // SAFETY: as the caller's.
-            unsafe { self.write_none::<S>(sink) };
-        }
         for layer in self.layers {
             let Some(origin) = self.origin(layer) else { continue };
             let side = side.min(layer.side);
