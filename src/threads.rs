@@ -50,6 +50,17 @@ impl Workers {
         parts.into_inner().unwrap_or_else(PoisonError::into_inner).1
     }
 
+    /// Calls `work` with every part.
+    pub fn each<T: Send>(&self, parts: impl Iterator<Item = T> + Send, work: impl Fn(T) + Sync) {
+        let parts = Mutex::new(parts);
+        let next = || parts.lock().unwrap_or_else(PoisonError::into_inner).next();
+        self.for_each(self.count(), |_, _| {
+            while let Some(part) = next() {
+                work(part);
+            }
+        });
+    }
+
     /// Calls `work(worker, item)` for every item; no two calls run at once with the same worker.
     pub fn for_each(&self, items: usize, work: impl Fn(usize, usize) + Sync) {
         let Some(pool) = &self.pool else { return (0..items).for_each(|item| work(0, item)) };

@@ -39,15 +39,13 @@ impl Cloud {
         let range = options.semantics == Semantics::Paper && options.paper.depth == Depth::Range;
         let depth = |[x, y, z]: [f32; 3]| if range { (x * x + y * y + z * z).sqrt() } else { z };
         let rows = self.points.chunks_mut(width).zip(self.depths.chunks_mut(width)).enumerate();
-        workers.share(rows, |share| {
-            for (y, (points, depths)) in share {
-                for (x, (to, of_to)) in points.iter_mut().zip(depths).enumerate() {
-                    *to = cleaned.at(x, y);
-                    *of_to = depth(*to);
-                }
+        workers.each(rows, |(y, (points, depths))| {
+            for (x, (to, of_to)) in points.iter_mut().zip(depths).enumerate() {
+                *to = cleaned.at(x, y);
+                *of_to = depth(*to);
             }
-            Ok(())
-        })
+        });
+        Ok(())
     }
 
     /// Bytes held.

@@ -42,29 +42,25 @@ impl DepthChanges {
         let mut below = table(repeat_n(false, width * height))?;
         let depths = &cloud.depths;
         let rows = right.chunks_mut(width).zip(below.chunks_mut(width)).enumerate();
-        workers.share(rows, |rows| {
-            for (y, (right, below)) in rows {
-                let (row, next) = (y * width, (y + 1) * width);
-                // To the pixels behind them in their row, axis 0, and in their columns.
-                let behind = [row + 1..next, next..(next + width).min(depths.len())];
-                for (axis, (changes, behind)) in [right, below].into_iter().zip(behind).enumerate()
-                {
-                    let pairs = depths[row..next].iter().zip(&depths[behind.clone()]);
-                    for (to, (before, depth)) in changes.iter_mut().zip(pairs.clone()) {
-                        *to = is_change(*before, depth - before, 1);
-                    }
-                    for ((to, at), (before, depth)) in changes.iter_mut().zip(behind).zip(pairs) {
-                        if before.is_nan() & !depth.is_nan() {
-                            *to = cloud.gap(at, axis).is_some_and(|gap| {
-                                let before = depths[at - gap * [1, width][axis]];
-                                is_change(before, depth - before, gap)
-                            });
-                        }
+        workers.each(rows, |(y, (right, below))| {
+            let (row, next) = (y * width, (y + 1) * width);
+            // To the pixels behind them in their row, axis 0, and in their columns.
+            let behind = [row + 1..next, next..(next + width).min(depths.len())];
+            for (axis, (changes, behind)) in [right, below].into_iter().zip(behind).enumerate() {
+                let pairs = depths[row..next].iter().zip(&depths[behind.clone()]);
+                for (to, (before, depth)) in changes.iter_mut().zip(pairs.clone()) {
+                    *to = is_change(*before, depth - before, 1);
+                }
+                for ((to, at), (before, depth)) in changes.iter_mut().zip(behind).zip(pairs) {
+                    if before.is_nan() & !depth.is_nan() {
+                        *to = cloud.gap(at, axis).is_some_and(|gap| {
+                            let before = depths[at - gap * [1, width][axis]];
+                            is_change(before, depth - before, gap)
+                        });
                     }
                 }
             }
-            Ok(())
-        })?;
+        });
         Ok(DepthChanges { width, height, right, below })
     }
 
@@ -75,7 +71,7 @@ impl DepthChanges {
 
     /// Without the changes that the slope of the surface on both sides explains: on a steep surface neighbours are
     /// as far apart as across an edge.
-    pub fn not_explained(mut self, cloud: &Cloud, workers: &Workers) -> Result<Self, Error> {
+    pub fn not_explained(mut self, cloud: &Cloud, workers: &Workers) -> Self {
         /// How far the surface is looked at along and across a change, in pixels.
         const ALONG: usize = 5;
         const ACROSS: usize = 2;
@@ -106,16 +102,13 @@ impl DepthChanges {
             sides.next() == Some(true) && sides.all(|is_steep| is_steep)
         };
         for (axis, changes) in [&mut self.right, &mut self.below].into_iter().enumerate() {
-            workers.share(changes.chunks_mut(width).enumerate(), |rows| {
-                for (y, row) in rows {
-                    for (x, change) in row.iter_mut().enumerate().filter(|(_, change)| **change) {
-                        *change = !is_explained(axis, y * width + x);
-                    }
+            workers.each(changes.chunks_mut(width).enumerate(), |(y, row)| {
+                for (x, change) in row.iter_mut().enumerate().filter(|(_, change)| **change) {
+                    *change = !is_explained(axis, y * width + x);
                 }
-                Ok(())
-            })?;
+            });
         }
-        Ok(self)
+        self
     }
 
     /// The largest radius around every pixel, row by row, of a window in which no two neighbours are a depth change

@@ -102,7 +102,7 @@ impl SecondPass {
         self.concern(cloud, &blocks, options, engine.workers())?;
         let SecondPass { wanted, levels, windows, choices, taken, second, .. } = self;
         let clean = depth_changes(cloud, options, engine.workers())?;
-        let clean = clean.not_explained(cloud, engine.workers())?.clean_radii()?;
+        let clean = clean.not_explained(cloud, engine.workers()).clean_radii()?;
         let least_noise = Asked::least_noise(options.paper.alpha);
         let limit = options.paper.largest_radius;
         let asked = Asked { blocks, wanted, levels, clean: &clean, limit, least_noise };
@@ -160,15 +160,13 @@ impl SecondPass {
         };
         let rows = concerned.chunks_mut(BLOCK * cloud.width).enumerate();
         let of_blocks = wanted.chunks_mut(blocks.across).zip(levels.chunks_mut(blocks.across));
-        workers.share(rows.zip(of_blocks), |share| {
-            for ((row, concerned), (wanted, levels)) in share {
-                for (column, (wanted, level)) in wanted.iter_mut().zip(levels).enumerate() {
-                    let pixels = blocks.pixels((column, row));
-                    (*wanted, *level) = concern(pixels, row * BLOCK * cloud.width, concerned);
-                }
+        workers.each(rows.zip(of_blocks), |((row, concerned), (wanted, levels))| {
+            for (column, (wanted, level)) in wanted.iter_mut().zip(levels).enumerate() {
+                let pixels = blocks.pixels((column, row));
+                (*wanted, *level) = concern(pixels, row * BLOCK * cloud.width, concerned);
             }
-            Ok(())
-        })
+        });
+        Ok(())
     }
 
     /// The estimate of a pixel, turned to the viewpoint: near depth changes and near creases from even windows, as the

@@ -29,19 +29,16 @@ impl<const N: usize> SummedArea<N> {
         let stride = width + 1;
         self.stride = stride;
         refill(&mut self.sums, repeat_n([0.0; N], stride * (height + 1)))?;
-        workers.share(self.sums[stride..].chunks_mut(stride).enumerate(), |rows| {
-            for (y, row) in rows {
-                let mut along = [0.0; N];
-                for (x, to) in row[1..].iter_mut().enumerate() {
-                    let value = value((x, y));
-                    for i in 0..N {
-                        along[i] += value[i];
-                    }
-                    *to = along;
+        workers.each(self.sums[stride..].chunks_mut(stride).enumerate(), |(y, row)| {
+            let mut along = [0.0; N];
+            for (x, to) in row[1..].iter_mut().enumerate() {
+                let value = value((x, y));
+                for i in 0..N {
+                    along[i] += value[i];
                 }
+                *to = along;
             }
-            Ok(())
-        })?;
+        });
         for y in 1..=height {
             let (above, row) = self.sums[(y - 1) * stride..].split_at_mut(stride);
             for (to, above) in row.iter_mut().zip(above) {

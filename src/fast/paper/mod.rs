@@ -231,14 +231,12 @@ impl<'a> Job<'a> {
         let length = row_length(points.width());
         paper.depths.grow(length * points.height())?;
         let rows = paper.depths[..length * points.height()].chunks_mut(length).enumerate();
-        workers.share(rows, |share| {
-            for (y, depths) in share {
-                let task = DepthsTask { points, options, y, whole_points, depths };
-                // SAFETY: the processor has the instruction set.
-                unsafe { paths::run(self.isa, task) };
-            }
-            Ok(())
-        })
+        workers.each(rows, |(y, depths)| {
+            let task = DepthsTask { points, options, y, whole_points, depths };
+            // SAFETY: the processor has the instruction set.
+            unsafe { paths::run(self.isa, task) };
+        });
+        Ok(())
     }
 
     /// The radii of all windows, in the chunks' rows; gives the largest.
