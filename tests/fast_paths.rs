@@ -3,8 +3,8 @@
 mod clouds;
 
 use clouds::{
-    Cloud, Kind, angle, assert_same_bits, compute, edge_options, fast_isas, methods, normal,
-    options, paper_options,
+    Cloud, Kind, angle, assert_same_bits, compute, compute_listed, edge_options, fast_isas,
+    methods, normal, options, paper_options,
 };
 use iine::{Estimator, Isa, Method, Normals, Options, Points, Semantics};
 
@@ -254,13 +254,7 @@ fn depths_orders_of_magnitude_apart_equal_the_plain_form() {
                 let mut estimator = Estimator::new(options);
                 let all = compute(&mut estimator, cloud);
                 let indices: Vec<i32> = (0..all.len() as i32).rev().step_by(3).collect();
-                let mut listed = vec![[CANARY; 4]; indices.len()];
-                let data = cloud.points.as_flattened();
-                let points = Points::interleaved(data, width, height, 3, 0).unwrap();
-                let to = listed.as_flattened_mut();
-                let mut normals =
-                    Normals::interleaved(to, indices.len(), 1, 4, 0, Some(3)).unwrap();
-                estimator.compute_indices(&points, &indices, &mut normals).unwrap();
+                let listed = compute_listed(&mut estimator, cloud, &indices);
                 let expected: Vec<_> = indices.iter().map(|index| all[*index as usize]).collect();
                 assert_same_bits(&expected, &listed, listed.len(), &format!("indices, {what}"));
             }

@@ -10,8 +10,8 @@
 //! return", as simulators write, with PCL's semantics three times as many.
 //!
 //! The program runs itself under valgrind: `frames N SEMANTICS METHOD POLICY METRES PLANE` computes N frames of a cloud
-//! that is moved to the right by so many metres, with a far plane at that depth if it is not 0. The counts are the difference between two frames and one, so neither start nor the
-//! first frame's allocations are in them.
+//! that is moved to the right by so many metres, with a far plane at that depth if it is not 0. The counts are the
+//! difference between two frames and one, so neither start nor the first frame's allocations are in them.
 
 #[path = "../benches/common/mod.rs"]
 mod common;

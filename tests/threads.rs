@@ -8,8 +8,8 @@ use std::cell::Cell;
 use std::process::Command;
 
 use clouds::{
-    Cloud, Kind, Random, assert_same_bits, compute, compute_to, edge_options, fast_isas, methods,
-    options, paper_options,
+    Cloud, Kind, Random, assert_same_bits, compute, compute_listed, compute_to, edge_options,
+    fast_isas, methods, options, paper_options,
 };
 use iine::{BorderPolicy, Error, Estimator, Isa, Method, Normals, Options};
 
@@ -88,15 +88,6 @@ fn where_depth_changes_are_far_away_the_number_of_threads_does_not_matter_either
     }
 }
 
-/// The indices' normals, by the estimator, in an array of their own.
-fn listed(estimator: &mut Estimator, cloud: &Cloud, indices: &[i32]) -> Vec<[f32; 4]> {
-    let mut found = vec![[7.0; 4]; indices.len()];
-    let data = found.as_flattened_mut();
-    let mut normals = Normals::interleaved(data, indices.len(), 1, 4, 0, Some(3)).unwrap();
-    estimator.compute_indices(&cloud.view(), indices, &mut normals).unwrap();
-    found
-}
-
 #[test]
 fn listed_pixels_get_what_the_whole_cloud_gives_them() {
     let mut random = Random::new(12);
@@ -125,7 +116,7 @@ fn listed_pixels_get_what_the_whole_cloud_gives_them() {
                         if isa == Isa::Scalar && indices.len() > 2000 {
                             continue;
                         }
-                        let found = listed(&mut estimator, &cloud, indices);
+                        let found = compute_listed(&mut estimator, &cloud, indices);
                         let expected: Vec<_> = indices.iter().map(|i| all[*i as usize]).collect();
                         let what = format!("{isa:?} {kind:?} {options:?}");
                         assert_same_bits(&found, &expected, width, &what);

@@ -34,21 +34,21 @@ impl<'a> Sink<'a> {
         Ok(Sink::Listed { normals, listed, width })
     }
 
-    /// The listed pixels among `count` from `(x, y)` on, with their elements.
-    fn listed(&self, x: usize, y: usize, count: usize) -> &[(u32, u32)] {
+    /// The listed pixels among as many as there are lanes from `(x, y)` on, with their elements.
+    fn listed(&self, x: usize, y: usize) -> &[(u32, u32)] {
         match self {
             Sink::All(_) => &[],
             Sink::Listed { listed, width, .. } => {
                 let first = y * width + x;
                 let start = listed.partition_point(|(pixel, _)| (*pixel as usize) < first);
                 let rest = &listed[start..];
-                let end = rest.partition_point(|(pixel, _)| (*pixel as usize) < first + count);
+                let end = rest.partition_point(|(pixel, _)| (*pixel as usize) < first + LANES);
                 &rest[..end]
             }
         }
     }
 
-    /// Writes some of the `lanes`' estimates, for the pixels from `(x, y)` on.
+    /// Writes these `lanes` of some estimates, for the pixels from `(x, y)` on.
     ///
     /// # Safety
     /// The pixels are inside the image, and no other thread writes them; the processor has the instruction set of `S`.
@@ -71,7 +71,7 @@ impl<'a> Sink<'a> {
                 }
             },
             Sink::Listed { normals, width, .. } => {
-                for (pixel, element) in self.listed(x, y, LANES) {
+                for (pixel, element) in self.listed(x, y) {
                     let lane = *pixel as usize - (y * width + x);
                     if lanes >> lane & 1 == 1 {
                         let normal = normal(lane);

@@ -318,8 +318,7 @@ impl Tile<'_> {
     /// Those of some lanes from pixel `(x, y)` on that are a layer's.
     #[cold]
     fn of_layer(&self, layer: &Layer, (x, y): (usize, usize), lanes: u32) -> u32 {
-        let is_own = |lane: &usize| layer.has(self.points.z(x + lane, y));
-        Bits(lanes).filter(is_own).fold(0, |lanes, lane| lanes | 1 << lane)
+        Bits(lanes).which(|lane| layer.has(self.points.z(x + lane, y)))
     }
 
     /// # Safety
@@ -463,8 +462,7 @@ impl Tile<'_> {
         if are_alike(first as usize..=last as usize, largest) {
             return lanes;
         }
-        let alone = Bits(lanes).filter(|lane| are_alike(*lane..=*lane, side(*lane)));
-        alone.fold(0, |alike, lane| alike | 1 << lane)
+        Bits(lanes).which(|lane| are_alike(lane..=lane, side(lane)))
     }
 
     /// The normals of some lanes of those that begin with pixel `(x, y)`, by the plain form.
@@ -504,11 +502,10 @@ impl Tile<'_> {
 
     #[cold]
     fn inside_at_border(&self, pair: &Pair) -> u32 {
-        let is_inside = |lane: &usize| {
+        Bits(pair.windows).which(|lane| {
             let x = pair.x + lane;
             self.inner(pair.row[x] as usize, pair.y).contains(&x)
-        };
-        Bits(pair.windows).filter(is_inside).fold(0, |lanes, lane| lanes | 1 << lane)
+        })
     }
 
     /// Whether a mirrored window certainly holds finite points only.
@@ -641,6 +638,13 @@ pub(crate) fn all(count: usize) -> u32 {
 
 /// The set bits of a mask, lowest first.
 pub(crate) struct Bits(pub u32);
+
+impl Bits {
+    /// The mask of those of which this is so.
+    fn which(self, is_so: impl Fn(usize) -> bool) -> u32 {
+        self.filter(|lane| is_so(*lane)).fold(0, |lanes, lane| lanes | 1 << lane)
+    }
+}
 
 impl Iterator for Bits {
     type Item = usize;

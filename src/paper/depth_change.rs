@@ -125,7 +125,7 @@ impl DepthChanges {
         let around = |at: usize, size: usize| at.saturating_sub(1)..(at + 2).min(size);
         let rows = self.right.chunks(width).zip(self.below.chunks(width)).enumerate();
         for (y, (right, below)) in rows {
-            for x in (0..width).filter(|x| right[*x] | below[*x]) {
+            for x in 0..width {
                 if right[x] {
                     spoil(x..x + 2, around(y, height));
                 }

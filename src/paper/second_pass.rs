@@ -110,6 +110,7 @@ impl SecondPass {
         let even = EvenWindows { cloud, asked: &asked, options, windows };
         engine.choices(&even, choices)?;
         refill(taken, repeat_n(0, blocks.count()))?;
+        // Marked first, as many pixels take the same.
         for block in choices.iter().flatten() {
             taken[*block as usize] = 1;
         }
@@ -171,7 +172,6 @@ impl SecondPass {
 
     /// The estimate of a pixel, turned to the viewpoint: near depth changes and near creases from even windows, as the
     /// options ask.
-    #[inline(always)]
     pub fn estimate(&self, cloud: &Cloud, options: &Options, at: usize) -> Estimate {
         let first = self.estimates[at];
         if !(asks(options) && self.concerned[at]) {
@@ -179,26 +179,21 @@ impl SecondPass {
         }
         let of_choice = self.choices[at].map(|block| self.second[block as usize].into());
         let of_choice = of_choice.filter(|found: &Estimate| !found.normal[0].is_nan());
-        let Some(Estimate { normal, curvature }) =
-            of_choice.or_else(|| around(cloud, options, at, first))
-        else {
+        let around = || {
+            let pixel = (at % cloud.width, at / cloud.width);
+            let same = |depth: f32, difference: f32, distance: usize| {
+                !is_depth_change(depth, difference, distance.max(1), options)
+            };
+            let has_none = options.one_sided_windows && first[0].is_nan();
+            has_none.then(|| surroundings::plane_around(cloud, pixel, same)).flatten()
+        };
+        let Some(Estimate { normal, curvature }) = of_choice.or_else(around) else {
             return first.into();
         };
         let normal = turn_to_viewpoint(normal, cloud.points[at], options.viewpoint);
         let has_curvature = options.method == Method::CovarianceMatrix;
         Estimate { normal, curvature: if has_curvature { curvature } else { f32::NAN } }
     }
-}
-
-/// The estimate of a pixel that has none so far and no choice, from the points next to it.
-#[cold]
-fn around(cloud: &Cloud, options: &Options, at: usize, first: [f32; 4]) -> Option<Estimate> {
-    let pixel = (at % cloud.width, at / cloud.width);
-    let same = |depth: f32, difference: f32, distance: usize| {
-        !is_depth_change(depth, difference, distance.max(1), options)
-    };
-    let has_none = options.one_sided_windows && first[0].is_nan();
-    has_none.then(|| surroundings::plane_around(cloud, pixel, same)).flatten()
 }
 
 /// Whether the options ask for a second pass.

@@ -282,6 +282,15 @@ pub fn compute(estimator: &mut Estimator, cloud: &Cloud) -> Vec<[f32; 4]> {
     found
 }
 
+/// The indices' normals, by the estimator, in an array of their own.
+pub fn compute_listed(estimator: &mut Estimator, cloud: &Cloud, indices: &[i32]) -> Vec<[f32; 4]> {
+    let mut found = vec![[7.0; 4]; indices.len()];
+    let data = found.as_flattened_mut();
+    let mut normals = Normals::interleaved(data, indices.len(), 1, 4, 0, Some(3)).unwrap();
+    estimator.compute_indices(&cloud.view(), indices, &mut normals).unwrap();
+    found
+}
+
 /// [`compute`], to where the normals are to be written.
 pub fn compute_to(
     found: &mut [[f32; 4]],
