@@ -33,16 +33,16 @@ impl Workers {
         1 + self.pool.as_ref().map_or(0, ThreadPool::current_num_threads)
     }
 
-    /// Calls `work` once on every thread, with the parts that fall to it, as it asks for them.
+    /// Calls `work(worker, parts)` once on every thread, with the parts that fall to it, as it asks for them.
     pub fn share<T: Send>(
         &self,
         parts: impl Iterator<Item = T> + Send,
-        work: impl Fn(&mut dyn Iterator<Item = T>) -> Result<(), Error> + Sync,
+        work: impl Fn(usize, &mut dyn Iterator<Item = T>) -> Result<(), Error> + Sync,
     ) -> Result<(), Error> {
         let parts = Mutex::new((parts, Ok(())));
         let lock = || parts.lock().unwrap_or_else(PoisonError::into_inner);
-        self.for_each(self.count(), |_, _| {
-            let done = work(&mut std::iter::from_fn(|| lock().0.next()));
+        self.for_each(self.count(), |worker, _| {
+            let done = work(worker, &mut std::iter::from_fn(|| lock().0.next()));
             if done.is_err() {
                 lock().1 = done;
             }

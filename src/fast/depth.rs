@@ -147,9 +147,9 @@ const FINE: f32 = 1.6e-4;
 const SAMPLES: usize = 8;
 
 /// What depths, of which none is larger than `deepest`, are multiplied by to become integers; none if these would not
-/// be fine enough for windows of up to `side`.
+/// be fine enough for points at this `spacing` and windows of up to `side`.
 pub(crate) fn scale_to_integers(
-    points: &Points,
+    spacing: f32,
     options: &Options,
     deepest: f32,
     side: usize,
@@ -163,12 +163,12 @@ pub(crate) fn scale_to_integers(
     let bits = 30.9 - ((half * half) as f64 * apart).log2();
     let bits = bits.min(30.0 - f64::from(deepest).log2());
     let scale = bits.floor().clamp(-120.0, 120.0).exp2() as f32;
-    (1.0 < FINE * spacing(points) * scale).then_some(scale)
+    (1.0 < FINE * spacing * scale).then_some(scale)
 }
 
 /// How far neighbours in a row are apart: the lower quartile of some here and there, so that a few that are far off do
 /// no harm; 0 if there are none.
-fn spacing(points: &Points) -> f32 {
+pub(crate) fn spacing(points: &Points) -> f32 {
     let places = |size: usize| (1..SAMPLES).map(move |i| i * size / SAMPLES);
     let pixels = places(points.height()).flat_map(|y| places(points.width()).map(move |x| (x, y)));
     let apart = pixels.map(|(x, y)| {

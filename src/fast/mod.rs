@@ -1,9 +1,9 @@
 //! The fast form of the whole method: the same steps as the plain form, over lanes, rows and tiles.
 //!
-//! First the windows of the whole image (`windows`), then tile by tile, and if need be layer by layer (`layers`), the
-//! points (`planes`), the method's rings of sums (`strip_pairs`, `strips`, `moments`, `half_windows`) and, run by run
-//! (`run`), the normals (`tile`). Tiles and layers are fixed by the frame and the options, so that results do not depend
-//! on the number of threads.
+//! First the windows of a slice of the image's rows (`windows`), then tile by tile, and if need be layer by layer
+//! (`layers`), the points (`planes`), the method's rings of sums (`strip_pairs`, `strips`, `moments`, `half_windows`) and,
+//! run by run (`run`), the normals (`tile`). Slices are made of whole strips; strips, tiles and layers are fixed by the
+//! frame and the options, so that results do not depend on the number of threads.
 
 mod arithmetic;
 mod buffer;
@@ -25,13 +25,13 @@ mod tile;
 mod windows;
 
 use std::ops::{Range, RangeInclusive};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use buffer::Buffer;
-use depth::scale_to_integers;
+use depth::{scale_to_integers, spacing};
 use half_windows::HalfWindows;
-use lanes::{LANES, Lanes};
-use layers::{Layer, layers};
+use lanes::LANES;
+use layers::layers;
 use moments::Moments;
 use paths::Task;
 use planes::{Frame, Planes};
@@ -39,40 +39,37 @@ use sink::Sink;
 use strip_pairs::StripPairs;
 use strips::Strips;
 use tile::{Sums, Tile};
-use windows::{Sweep, WindowRows, row_length, sides};
+use windows::{Sides, Windows, reach};
 
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
-use crate::memory::{bytes, make_room};
+use crate::memory::{bytes, resize};
 use crate::options::{Method, Options};
 use crate::simd::{GROUP, Groups};
-use crate::smoothing_area::depth_smoothing;
 use crate::threads::Workers;
 use crate::window::Image;
 
 /// Columns and rows of the images that are not left to the plain form. Floats hold them.
 pub(crate) const SIZES: RangeInclusive<usize> = 3..=1 << 24;
 
-/// Rows of a tile: those around it that its windows reach are read again for the next one.
-const TILE_ROWS: usize = 128;
+/// Rows of a strip, and of its tiles, at most: those around it that its windows reach are read again for the next one.
+const STRIP_ROWS: usize = 128;
+
+/// A slice has so many times as many rows as its windows reach, at least: the sweep up starts that far below it.
+const SLICE_REACHES: usize = 4;
 
 /// Bytes of a tile's rings, to stay near the second-level cache without narrow tiles, the columns around which are
 /// summed again. Found, as the rows, by trying half and twice as much with windows of 5 to 50 pixels.
 const TILE_BYTES: usize = 1 << 20;
 
-/// How much deeper than the frame before a frame may be for its rows to be swept only once.
-const DEEPER: f32 = 1.25;
-
 /// Scratch memory and threads, reused from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     workers: Workers,
-    rows: Buffer<Lanes>,
     each: Vec<Mutex<WorkerScratch>>,
     listed: Vec<(u32, u32)>,
-    chunks: Vec<Chunk>,
-    /// How far the sweeps of the frame before reached around their rows.
+    /// How far the windows of the frame before reached.
     last_reach: usize,
     paper: paper::Scratch,
 }
@@ -80,8 +77,15 @@ pub(crate) struct Scratch {
 /// What one worker needs.
 #[derive(Debug, Default)]
 struct WorkerScratch {
-    sweep: Sweep,
-    /// Of the tile: here it leaves its loops the registers.
+    windows: Windows,
+    sums: TileScratch,
+    paper: paper::WorkerScratch,
+}
+
+/// What a tile needs.
+#[derive(Debug, Default)]
+struct TileScratch {
+    /// Here it leaves the tile's loops the registers.
     frame: Frame,
     planes: Planes,
     moments: Moments,
@@ -90,7 +94,6 @@ struct WorkerScratch {
     /// One of the two is in use, if any.
     half_windows: HalfWindows<f64>,
     integer_half_windows: HalfWindows<i32>,
-    paper: paper::WorkerScratch,
 }
 
 impl Scratch {
@@ -109,18 +112,31 @@ impl Scratch {
     /// Bytes held.
     pub fn size(&self) -> usize {
         let each = self.each.iter().map(|scratch| lock(scratch).size()).sum::<usize>();
-        self.rows.size() + bytes(&self.listed) + bytes(&self.chunks) + self.paper.size() + each
+        bytes(&self.listed) + self.paper.size() + each
     }
 }
 
 impl WorkerScratch {
-    /// Makes room for a job's tiles with frames that are no larger, and windows of up to `side`.
-    fn reserve(&mut self, job: &Job, frame: &Frame, side: usize) -> Result<(), Error> {
+    fn size(&self) -> usize {
+        self.windows.size() + self.sums.size() + self.paper.size()
+    }
+}
+
+impl TileScratch {
+    /// Makes room for tiles of a job with so many columns and windows of up to `side`; of depths, in f64 or integers.
+    fn reserve(
+        &mut self,
+        job: &Job,
+        is_integer: bool,
+        columns: usize,
+        side: usize,
+    ) -> Result<(), Error> {
+        let frame = &Frame::largest(columns, side, job.image.width);
         self.planes.reserve(frame)?;
         match job.options.method {
             Method::CovarianceMatrix => self.moments.reserve(frame, side),
             Method::Average3DGradient => self.strip_pairs.reserve(frame, side),
-            Method::AverageDepthChange if job.scale.is_some() => {
+            Method::AverageDepthChange if is_integer => {
                 self.integer_half_windows.reserve(frame, side)
             }
             Method::AverageDepthChange => self.half_windows.reserve(frame, side),
@@ -129,88 +145,17 @@ impl WorkerScratch {
     }
 
     fn size(&self) -> usize {
-        self.sweep.size()
-            + self.planes.size()
+        self.planes.size()
             + self.moments.size()
             + self.strip_pairs.size()
             + self.strips.size()
             + self.half_windows.size()
             + self.integer_half_windows.size()
-            + self.paper.size()
     }
 }
 
 fn lock(scratch: &Mutex<WorkerScratch>) -> MutexGuard<'_, WorkerScratch> {
     scratch.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Image rows that are swept together, with the rows around them whose depth changes reach them.
-#[derive(Clone, Debug)]
-struct Chunk {
-    own: Range<usize>,
-    swept: Range<usize>,
-    /// Where the swept rows start among the rows of the map.
-    start: usize,
-}
-
-impl Chunk {
-    /// Which of the map's rows an own row of the chunk is.
-    fn place(&self, y: usize) -> usize {
-        self.start + y - self.swept.start
-    }
-}
-
-/// The sides of all pixels' windows, 0 for none.
-#[derive(Clone, Copy)]
-struct Sides<'a> {
-    /// The rows that the chunks' sweeps have filled.
-    rows: &'a [Lanes],
-    width: usize,
-    chunks: &'a [Chunk],
-}
-
-impl<'a> Sides<'a> {
-    /// Those of row `y`, readable up to a whole pair of groups.
-    fn row(&self, y: usize) -> &'a [f32] {
-        let chunk = &self.chunks[y / self.chunks[0].own.len()];
-        sides(self.rows, self.width, chunk.place(y))
-    }
-}
-
-/// Reads a map's whole numbers, row by row; `row` gives those of one of the map's rows.
-fn read_map<'r>(
-    chunks: &[Chunk],
-    (width, height): (usize, usize),
-    found: &mut Vec<u32>,
-    row: impl Fn(usize) -> &'r [f32],
-) -> Result<(), Error> {
-    make_room(found, width * height)?;
-    for place in chunks.iter().flat_map(|chunk| chunk.own.clone().map(|y| chunk.place(y))) {
-        found.extend(row(place)[..width].iter().map(|number| *number as u32));
-    }
-    Ok(())
-}
-
-/// What the sweeps found.
-struct Swept {
-    /// The least and the largest finite depth; infinity and -infinity if there is none.
-    depths: [f32; 2],
-    /// A bound on the windows' sides.
-    side: f32,
-}
-
-impl Swept {
-    /// The largest magnitude of a finite depth.
-    fn deepest(&self) -> f32 {
-        let [least, largest] = self.depths;
-        largest.max(-least).max(0.0)
-    }
-
-    /// No finite depth's magnitude is smaller.
-    fn nearest(&self) -> f32 {
-        let [least, largest] = self.depths;
-        least.max(-largest).max(0.0)
-    }
 }
 
 /// One computation.
@@ -220,8 +165,11 @@ struct Job<'a> {
     options: &'a Options,
     image: Image,
     whole_points: bool,
-    /// What depths are multiplied by to become integers, where these are fine enough for [`HalfWindows`].
-    scale: Option<f32>,
+    /// How far points are apart, for [`scale_to_integers`].
+    spacing: f32,
+    /// Strips of the image, and of a slice.
+    strips: usize,
+    per_slice: usize,
 }
 
 /// The normals of the pixels that `indices` list, or of all.
@@ -233,49 +181,7 @@ pub(crate) fn compute(
     normals: &Normals,
     scratch: &mut Scratch,
 ) -> Result<(), Error> {
-    scratch.prepare(options.threads)?;
-    let (width, height) = (points.width(), points.height());
-    let Scratch { workers, rows, each, listed, chunks, last_reach, .. } = scratch;
-    let count = workers.count();
-
-    let image = Image { width, height, border_policy: options.border_policy };
-    let whole_points = points.has_whole_points(normals);
-    let mut job = Job { isa, points, options, image, whole_points, scale: None };
-
-    for scratch in &each[..count] {
-        lock(scratch).sweep.reserve(width)?;
-    }
-    let length = row_length(width);
-    let mut reach = job.reach(0.0).max(*last_reach);
-    let (found, swept) = loop {
-        share_out(height, count, reach, chunks);
-        let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
-        rows.grow(swept * length)?;
-        let found = job.sweep(workers, each, chunks, &mut rows[..swept * length]);
-        if chunks.len() == 1 || job.reach(found.deepest()) <= reach {
-            break (found, swept);
-        }
-        // Depths reach farther than in the frame before.
-        reach = job.reach(DEEPER * found.deepest());
-    };
-    let deepest = found.deepest();
-    *last_reach = reach.min(job.reach(DEEPER * deepest));
-
-    let reach = job.reach(deepest);
-    let rows = &rows[..swept * length];
-    let sides = Sides { rows, width, chunks };
-    let sink = Sink::new(normals, indices, width, listed)?;
-    let side = (found.side as usize).min(width.min(height));
-    if options.method == Method::AverageDepthChange {
-        job.scale = scale_to_integers(points, options, deepest, side);
-    }
-    let frame = Frame::largest(job.columns(reach), side, width);
-    for scratch in &each[..count] {
-        lock(scratch).reserve(&job, &frame, side)?;
-    }
-    let (layers, count) = layers([found.nearest(), deepest], job.range(), side, options);
-    job.tiles(workers, each, reach, &layers[..count], sides, &sink);
-    Ok(())
+    compute_slices(isa, points, options, indices, normals, |_, _| (), scratch)
 }
 
 /// The sides of all pixels' windows, row by row, 0 for none, and their normals.
@@ -287,25 +193,101 @@ pub(crate) fn compute_with_sides(
     found: &mut Vec<u32>,
     scratch: &mut Scratch,
 ) -> Result<(), Error> {
-    compute(isa, points, options, None, normals, scratch)?;
-    let size @ (width, _) = (points.width(), points.height());
-    read_map(&scratch.chunks, size, found, |place| sides(&scratch.rows, width, place))
+    let width = points.width();
+    resize(found, width * points.height(), 0)?;
+    let found = Parts(found.as_mut_ptr());
+    let read = |rows: Range<usize>, sides: Sides| {
+        for y in rows {
+            // SAFETY: the row is in the image, and of one slice.
+            let to = unsafe { found.part(y * width..(y + 1) * width) };
+            for (to, side) in to.iter_mut().zip(sides.row(y)) {
+                *to = *side as u32;
+            }
+        }
+    };
+    compute_slices(isa, points, options, None, normals, read, scratch)
 }
 
-/// The rows shared out to `count` sweeps. A depth change more than `reach` away decides no window, so each sweep can
-/// start and end that far around its own rows.
-fn share_out(height: usize, count: usize, reach: usize, chunks: &mut Vec<Chunk>) {
-    let per_chunk = height.div_ceil(count);
-    let per_chunk = if per_chunk < 2 * reach { height } else { per_chunk };
-    let mut start = 0;
-    let first_rows = (0..height).step_by(per_chunk);
-    chunks.clear();
-    chunks.extend(first_rows.map(|first| {
-        let own = first..(first + per_chunk).min(height);
-        let swept = own.start.saturating_sub(reach)..(own.end + reach).min(height);
-        start += swept.len();
-        Chunk { own, start: start - swept.len(), swept }
-    }));
+/// As [`compute`]; gives every slice's rows and the sides of their windows to `read`.
+fn compute_slices(
+    isa: Isa,
+    points: &Points,
+    options: &Options,
+    indices: Option<&[i32]>,
+    normals: &Normals,
+    read: impl Fn(Range<usize>, Sides) + Sync,
+    scratch: &mut Scratch,
+) -> Result<(), Error> {
+    scratch.prepare(options.threads)?;
+    let Scratch { workers, each, listed, last_reach, .. } = scratch;
+    let (width, height) = (points.width(), points.height());
+    let strips = height.div_ceil(STRIP_ROWS);
+    let least_reach = reach(points, options, 0.0);
+    let slice_rows = SLICE_REACHES * least_reach.max(*last_reach);
+    let is_depth = options.method == Method::AverageDepthChange;
+    let job = Job {
+        isa,
+        points,
+        options,
+        image: Image { width, height, border_policy: options.border_policy },
+        whole_points: points.has_whole_points(normals),
+        spacing: if is_depth { spacing(points) } else { 0.0 },
+        strips,
+        per_slice: slice_rows.div_ceil(STRIP_ROWS).min(strips),
+    };
+    // Nothing is written if there is no memory for what is known already.
+    let columns = job.columns(true, least_reach);
+    let side = Frame::most_of_ring(least_reach - 2).min(width.min(height));
+    for scratch in &each[..workers.count()] {
+        let WorkerScratch { windows, sums, .. } = &mut *lock(scratch);
+        windows.start(points, options, job.per_slice * STRIP_ROWS)?;
+        sums.reserve(&job, true, columns, side)?;
+    }
+    let sink = Sink::new(normals, indices, width, listed)?;
+    let reach = AtomicUsize::new(0);
+    let chunks = chunks(strips, workers.count());
+    let done = workers.share(chunks, |worker, chunks| {
+        let WorkerScratch { windows, sums, .. } = &mut *lock(&each[worker]);
+        for chunk in chunks {
+            for first in chunk.clone().step_by(job.per_slice) {
+                let slice = first..(first + job.per_slice).min(chunk.end);
+                let rows = job.row(slice.start)..job.row(slice.end);
+                job.sweep(windows, rows.clone())?;
+                read(rows, windows.sides(width));
+                for strip in slice {
+                    let rows = job.row(strip)..job.row(strip + 1);
+                    reach.fetch_max(job.tiles(windows, sums, rows, &sink)?, Ordering::Relaxed);
+                }
+            }
+        }
+        Ok(())
+    });
+    *last_reach = reach.into_inner();
+    if done.is_err() {
+        write_none(normals);
+    }
+    done
+}
+
+/// Writes NaN everywhere: no output is partial.
+fn write_none(normals: &Normals) {
+    for y in 0..normals.height() {
+        for x in 0..normals.width() {
+            // SAFETY: the pixel is one of the normals', and all threads are done.
+            unsafe { normals.write(x, y, [f32::NAN; 3], f32::NAN) };
+        }
+    }
+}
+
+/// The strips of an image in chunks for the workers: ever fewer at a time, so that all end at the same time.
+fn chunks(strips: usize, workers: usize) -> impl Iterator<Item = Range<usize>> {
+    let mut left = 0..strips;
+    std::iter::from_fn(move || {
+        let count = if workers == 1 { left.len() } else { left.len().div_ceil(2 * workers) };
+        let chunk = left.start..left.start + count;
+        left.start = chunk.end;
+        (count > 0).then_some(chunk)
+    })
 }
 
 /// Lends every item of a slice to one worker at a time.
@@ -325,94 +307,75 @@ impl<T> Parts<T> {
 }
 
 impl Job<'_> {
-    /// How far a window, or a depth change that decides one, can be from its pixel, where no depth is above `deepest`.
-    fn reach(&self, deepest: f32) -> usize {
-        let smoothing = depth_smoothing(deepest, self.options);
-        (smoothing as usize).saturating_add(2).min(self.image.width + self.image.height)
+    /// Where a strip starts: strips are of like heights.
+    fn row(&self, strip: usize) -> usize {
+        strip * self.image.height / self.strips
     }
 
     // Not inlined, as the next one: profiles and the test of instruction counts tell the two by name.
-    /// Steps 1 to 3: fills the rows with sides of windows.
+    /// Steps 1 to 3: the windows of a slice.
     #[inline(never)]
-    fn sweep(
-        &self,
-        workers: &Workers,
-        each: &[Mutex<WorkerScratch>],
-        chunks: &[Chunk],
-        rows: &mut [Lanes],
-    ) -> Swept {
-        let length = row_length(self.image.width);
-        let rows = Parts(rows.as_mut_ptr());
-        let all = Mutex::new(Swept { depths: [f32::INFINITY, f32::NEG_INFINITY], side: 0.0 });
-        workers.for_each(chunks.len(), |worker, item| {
-            let chunk = &chunks[item];
-            let places = chunk.start * length..(chunk.start + chunk.swept.len()) * length;
-            // SAFETY: chunks have rows of their own.
-            let rows = unsafe { rows.part(places) };
-            let sweep = &mut lock(&each[worker]).sweep;
-            let task = SweepTask { job: self, chunk, rows, sweep };
-            // SAFETY: the processor has the instruction set of the job.
-            let swept = unsafe { paths::run(self.isa, task) };
-            let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
-            let ([least, largest], [other_least, other_largest]) = (all.depths, swept.depths);
-            all.depths = [least.min(other_least), largest.max(other_largest)];
-            all.side = all.side.max(swept.side);
-        });
-        all.into_inner().unwrap_or_else(PoisonError::into_inner)
+    fn sweep(&self, windows: &mut Windows, slice: Range<usize>) -> Result<(), Error> {
+        // SAFETY: the processor has the instruction set of the job.
+        unsafe { paths::run(self.isa, SweepTask { job: self, windows, slice }) }
     }
 
-    /// Steps 4 and 5, all tiles.
+    /// Steps 4 and 5: the tiles of a strip, the windows of which were found. Returns how far they reach.
     #[inline(never)]
     fn tiles(
         &self,
-        workers: &Workers,
-        each: &[Mutex<WorkerScratch>],
-        reach: usize,
-        layers: &[Layer],
-        sides: Sides,
+        windows: &Windows,
+        scratch: &mut TileScratch,
+        rows: Range<usize>,
         sink: &Sink,
-    ) {
-        let Image { width, height, .. } = self.image;
-        let columns = self.columns(reach);
-        let across = width.div_ceil(columns);
-        let down = height.div_ceil(TILE_ROWS);
-        let rows = height.div_ceil(down);
-        workers.for_each(across * down, |worker, item| {
-            let (row, column) = (item / across * rows, item % across * columns);
-            let tile = Tile {
-                points: self.points,
-                options: self.options,
+    ) -> Result<usize, Error> {
+        let &Job { points, options, image: Image { width, height, .. }, .. } = self;
+        let own = windows.swept(rows.clone());
+        let reach = reach(points, options, own.deepest());
+        let around = rows.start.saturating_sub(reach)..(rows.end + reach).min(height);
+        let around = windows.swept(around);
+        let side = (own.side as usize).min(width.min(height));
+        let is_depth = options.method == Method::AverageDepthChange;
+        let scale = || scale_to_integers(self.spacing, options, around.deepest(), side);
+        let scale = is_depth.then(scale).flatten();
+        let columns = self.columns(scale.is_some(), reach);
+        scratch.reserve(self, scale.is_some(), columns, side)?;
+        let depths = [around.nearest(), around.deepest()];
+        let (layers, count) = layers(depths, self.range(scale.is_some()), side, options);
+        for column in (0..width).step_by(columns) {
+            let tile = &Tile {
+                points,
+                options,
                 image: &self.image,
                 columns: column..(column + columns).min(width),
-                rows: row..(row + rows).min(height),
-                layers,
+                rows: rows.clone(),
+                layers: &layers[..count],
                 whole_points: self.whole_points,
-                sides,
+                sides: windows.sides(width),
             };
-            let scratch = &mut lock(&each[worker]);
-            let task = TileTask { job: self, tile: &tile, scratch, sink };
             // SAFETY: the processor has the instruction set of the job, and tiles do not share pixels.
-            unsafe { paths::run(self.isa, task) };
-        });
+            unsafe { paths::run(self.isa, TileTask { tile, scale, scratch, sink }) };
+        }
+        Ok(reach)
     }
 
-    /// How many times as deep as the nearest points others may be for the method's sums to be fine enough for both:
-    /// found by trying, as more layers take more time.
-    fn range(&self) -> f32 {
+    /// How many times as deep as the nearest points others may be for the method's sums, of integers or not, to be fine
+    /// enough for both: found by trying, as more layers take more time.
+    fn range(&self, is_integer: bool) -> f32 {
         match self.options.method {
-            Method::AverageDepthChange if self.scale.is_some() => f32::INFINITY,
+            Method::AverageDepthChange if is_integer => f32::INFINITY,
             Method::AverageDepthChange => 4096.0,
             Method::CovarianceMatrix | Method::Average3DGradient | Method::Simple3DGradient => 24.0,
         }
     }
 
     /// Columns of a tile, if windows reach so far from their pixels.
-    fn columns(&self, reach: usize) -> usize {
+    fn columns(&self, is_integer: bool, reach: usize) -> usize {
         let column = 3 * size_of::<f32>()
             + match self.options.method {
                 Method::CovarianceMatrix => Moments::COLUMN,
                 Method::Average3DGradient => StripPairs::COLUMN,
-                Method::AverageDepthChange if self.scale.is_some() => HalfWindows::<i32>::COLUMN,
+                Method::AverageDepthChange if is_integer => HalfWindows::<i32>::COLUMN,
                 Method::AverageDepthChange => HalfWindows::<f64>::COLUMN,
                 Method::Simple3DGradient => Strips::COLUMN,
             };
@@ -424,36 +387,30 @@ impl Job<'_> {
     }
 }
 
-/// The sweeps over one chunk of rows, into the map's rows of the chunk.
+/// The sweeps of one slice.
 struct SweepTask<'a> {
     job: &'a Job<'a>,
-    chunk: &'a Chunk,
-    rows: &'a mut [Lanes],
-    sweep: &'a mut Sweep,
+    windows: &'a mut Windows,
+    slice: Range<usize>,
 }
 
 impl Task for SweepTask<'_> {
-    type Output = Swept;
+    type Output = Result<(), Error>;
 
     #[inline(always)]
-    unsafe fn run<S: Groups>(self) -> Swept {
-        let SweepTask { job, chunk, rows, sweep } = self;
-        let mut windows = WindowRows::new(job.image.width, rows);
-        let swept = (chunk.swept.start, chunk.swept.len());
+    unsafe fn run<S: Groups>(self) -> Result<(), Error> {
+        let SweepTask { job, windows, slice } = self;
         // SAFETY: as the caller's.
-        unsafe {
-            let depths = windows.sweep_down::<S::Pair>(job.points, job.options, swept, sweep);
-            let side = windows.sweep_up::<S::Pair>(job.points, job.options, swept, depths, sweep);
-            Swept { depths, side }
-        }
+        unsafe { windows.find::<S::Pair>(job.points, job.options, slice) }
     }
 }
 
 /// One tile, with the sums of its method; no one else writes the tile's pixels.
 struct TileTask<'a> {
-    job: &'a Job<'a>,
     tile: &'a Tile<'a>,
-    scratch: &'a mut WorkerScratch,
+    /// What depths are multiplied by to become integers, where these are fine enough for [`HalfWindows`].
+    scale: Option<f32>,
+    scratch: &'a mut TileScratch,
     sink: &'a Sink<'a>,
 }
 
@@ -462,15 +419,15 @@ impl Task for TileTask<'_> {
 
     #[inline(always)]
     unsafe fn run<S: Groups>(self) {
-        let TileTask { job, tile, scratch, sink } = self;
-        let WorkerScratch { frame, planes, moments, strip_pairs, strips, .. } = scratch;
-        let WorkerScratch { half_windows, integer_half_windows, .. } = scratch;
+        let TileTask { tile, scale, scratch, sink } = self;
+        let TileScratch { frame, planes, moments, strip_pairs, strips, .. } = scratch;
+        let TileScratch { half_windows, integer_half_windows, .. } = scratch;
         // SAFETY: as the caller's.
         unsafe {
             match tile.options.method {
                 Method::CovarianceMatrix => tile.compute::<S, _>(frame, planes, moments, sink),
                 Method::Average3DGradient => tile.compute::<S, _>(frame, planes, strip_pairs, sink),
-                Method::AverageDepthChange => match job.scale {
+                Method::AverageDepthChange => match scale {
                     Some(scale) => {
                         let sums = integer_half_windows.scaled(scale);
                         tile.compute::<S, _>(frame, planes, sums, sink);

@@ -36,6 +36,11 @@ impl Frame {
         (side + 2).next_power_of_two()
     }
 
+    /// The largest side that needs no larger ring than this one.
+    pub fn most_of_ring(side: usize) -> usize {
+        Self::ring(side) - 2
+    }
+
     /// What windows of up to `side` around a tile's pixels reach, and the pixels around them.
     pub fn around(
         columns: &Range<usize>,

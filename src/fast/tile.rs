@@ -3,13 +3,13 @@
 
 use std::ops::{Range, RangeInclusive};
 
-use super::Sides;
 use super::arithmetic::{Floats, dot};
 use super::lanes::LANES;
 use super::layers::Layer;
 use super::planes::{Frame, MARGIN, Planes};
 use super::run::{Noted, RUN};
 use super::sink::Sink;
+use super::windows::Sides;
 use crate::Error;
 use crate::cloud::Points;
 use crate::methods::{Estimate, estimate};

@@ -1,5 +1,9 @@
 //! Steps 1 to 3, fast: depth changes and the forward chamfer pass in one sweep down the rows, the backward pass and
 //! the sides of the windows in one sweep up. The plain forms are in `depth_change`, `distance`, `smoothing_area`.
+//!
+//! A depth change farther away than the largest window decides none. So windows are found slice by slice: the sweep down
+//! goes on that far below the slice's rows, and the sweep up starts from there. What the sweeps read and write is still
+//! in the cache when the slice's normals are made.
 
 use std::ops::Range;
 
@@ -8,20 +12,177 @@ use super::lanes::{LANES, LaneOrder, Lanes};
 use crate::Error;
 use crate::cloud::Points;
 use crate::distance::{DIAGONAL, STRAIGHT, far};
+use crate::memory::{bytes, resize};
 use crate::options::Options;
 use crate::simd::Simd;
 use crate::smoothing_area::{LARGEST, SMALLEST, depth_smoothing};
 
+/// The windows of a slice of the image's rows, and what the sweep down keeps for the next slice.
+#[derive(Debug, Default)]
+pub(crate) struct Windows {
+    sweep: Sweep,
+    map: Buffer<Lanes>,
+    /// The rows below the slice as they were swept down.
+    held: Buffer<Lanes>,
+    /// Of the image's rows that were swept.
+    swept: Vec<Swept>,
+    /// The image's row that the sweep down started with, that of the map's first row, and the next to sweep down.
+    start: usize,
+    first: usize,
+    down: usize,
+    /// The row after the slice; none before the first.
+    after: Option<usize>,
+}
+
+/// What the sweeps found in a row, or in several.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Swept {
+    /// The least and the largest finite depth; infinity and -infinity if there is none.
+    depths: [f32; 2],
+    /// The largest side of a window.
+    pub side: f32,
+}
+
+impl Swept {
+    const NOTHING: Self = Swept { depths: [f32::INFINITY, f32::NEG_INFINITY], side: 0.0 };
+
+    fn and(self, other: Self) -> Self {
+        let ([least, largest], [other_least, other_largest]) = (self.depths, other.depths);
+        let depths = [least.min(other_least), largest.max(other_largest)];
+        Swept { depths, side: self.side.max(other.side) }
+    }
+
+    /// The largest magnitude of a finite depth.
+    pub fn deepest(&self) -> f32 {
+        let [least, largest] = self.depths;
+        largest.max(-least).max(0.0)
+    }
+
+    /// No finite depth's magnitude is smaller.
+    pub fn nearest(&self) -> f32 {
+        let [least, largest] = self.depths;
+        least.max(-largest).max(0.0)
+    }
+}
+
+/// How far a window, or a depth change that decides one, can be from its pixel, where no depth is above `deepest`.
+pub(crate) fn reach(points: &Points, options: &Options, deepest: f32) -> usize {
+    let smoothing = depth_smoothing(deepest, options);
+    (smoothing as usize).saturating_add(2).min(points.width() + points.height())
+}
+
+impl Windows {
+    /// Makes room for slices of so many rows, as far as depth adds nothing to what windows reach, before the first one.
+    pub fn start(&mut self, points: &Points, options: &Options, rows: usize) -> Result<(), Error> {
+        let (length, height) = (row_length(points.width()), points.height());
+        let reach = reach(points, options, 0.0);
+        self.sweep.reserve(points.width())?;
+        self.map.grow((rows + 2 * reach).min(height) * length)?;
+        self.held.grow(reach.min(height) * length)?;
+        resize(&mut self.swept, height, Swept::NOTHING)?;
+        self.after = None;
+        Ok(())
+    }
+
+    /// Finds the sides of the windows of a slice. Costs least if it follows the one before.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`, which has sixteen lanes.
+    #[inline(always)]
+    pub unsafe fn find<S: Simd>(
+        &mut self,
+        points: &Points,
+        options: &Options,
+        slice: Range<usize>,
+    ) -> Result<(), Error> {
+        let (length, height) = (row_length(points.width()), points.height());
+        if self.after == Some(slice.start) {
+            let held = (self.down - slice.start) * length;
+            self.map[..held].copy_from_slice(&self.held[..held]);
+            self.first = slice.start;
+        } else {
+            self.restart(slice.start.saturating_sub(reach(points, options, 0.0)));
+        }
+        let mut end = slice.end;
+        loop {
+            if self.down < end {
+                self.map.grow((end - self.first) * length)?;
+                let mut rows = WindowRows::new(points.width(), self.first, &mut self.map);
+                let (down, swept) = (self.down..end, &mut self.swept);
+                // SAFETY: as the caller's.
+                unsafe { rows.sweep_down::<S>(points, options, down, &mut self.sweep, swept) };
+                self.down = end;
+            }
+            let reach = reach(points, options, self.swept(slice.clone()).deepest());
+            end = (slice.end + reach).min(height);
+            let start = slice.start.saturating_sub(reach);
+            if start < self.start {
+                self.restart(start);
+            } else if end <= self.down {
+                break;
+            }
+        }
+        let below = (slice.end - self.first) * length..(self.down - self.first) * length;
+        self.held.grow(below.len())?;
+        self.held[..below.len()].copy_from_slice(&self.map[below]);
+        self.after = Some(slice.end);
+        let mut rows = WindowRows::new(points.width(), self.first, &mut self.map);
+        let (up, swept) = (slice.start..self.down, &mut self.swept);
+        // SAFETY: as the caller's.
+        unsafe { rows.sweep_up::<S>(points, options, up, slice.end, &mut self.sweep, swept) };
+        Ok(())
+    }
+
+    /// Starts the sweep down anew with this row.
+    fn restart(&mut self, row: usize) {
+        (self.start, self.first, self.down) = (row, row, row);
+    }
+
+    /// What was found in these rows: depths in the slice's and those that its windows reach, windows in the slice's.
+    pub fn swept(&self, rows: Range<usize>) -> Swept {
+        self.swept[rows].iter().fold(Swept::NOTHING, |all, row| all.and(*row))
+    }
+
+    /// The sides of the slice's windows.
+    pub fn sides(&self, width: usize) -> Sides<'_> {
+        Sides { rows: &self.map, width, first: self.first }
+    }
+
+    /// Bytes held.
+    pub fn size(&self) -> usize {
+        self.sweep.size() + self.map.size() + self.held.size() + bytes(&self.swept)
+    }
+}
+
+/// The sides of the windows of a slice's pixels, 0 for none.
+#[derive(Clone, Copy)]
+pub(crate) struct Sides<'a> {
+    rows: &'a [Lanes],
+    width: usize,
+    /// The image's row that is the first of these.
+    first: usize,
+}
+
+impl<'a> Sides<'a> {
+    /// Those of the image's row `y`, and more that means nothing: the width rounded up to a multiple of 16, at least.
+    pub fn row(&self, y: usize) -> &'a [f32] {
+        let length = row_length(self.width);
+        floats(&self.rows[(y - self.first) * length..][..length])
+    }
+}
+
 /// Rows of a map in lane order, each between two elements that hold the neighbouring segments' ends. After the
 /// upward sweep the rows hold the sides of windows instead, pixel by pixel.
-pub(crate) struct WindowRows<'a> {
+struct WindowRows<'a> {
     order: LaneOrder,
+    /// The image's row that is the first of these.
+    first: usize,
     rows: &'a mut [Lanes],
 }
 
 /// What the sweeps need beside the map.
 #[derive(Debug, Default)]
-pub(crate) struct Sweep {
+struct Sweep {
     /// A ring of two rows of depths in lane order, each with an element more for the following segments' first pixels.
     z: Buffer<Lanes>,
     /// Masks: where the pixel has a right neighbour, and where there is a depth change from the one above.
@@ -32,7 +193,7 @@ pub(crate) struct Sweep {
 
 impl Sweep {
     /// Makes room for rows of so many pixels.
-    pub fn reserve(&mut self, width: usize) -> Result<(), Error> {
+    fn reserve(&mut self, width: usize) -> Result<(), Error> {
         let length = LaneOrder::new(width).segment + 1;
         self.z.grow(2 * length)?;
         for row in [&mut self.tested, &mut self.above, &mut self.sides] {
@@ -69,129 +230,120 @@ impl Sweep {
     }
 
     /// Bytes held.
-    pub fn size(&self) -> usize {
+    fn size(&self) -> usize {
         let Sweep { z, tested, above, sides, .. } = self;
         [z, tested, above, sides].map(Buffer::size).into_iter().sum()
     }
 }
 
 /// Elements of a row of the map.
-pub(crate) fn row_length(width: usize) -> usize {
+fn row_length(width: usize) -> usize {
     LaneOrder::new(width).segment + 2
 }
 
 impl<'a> WindowRows<'a> {
-    /// `rows` holds `row_length` elements for each of the rows that will be swept.
-    pub fn new(width: usize, rows: &'a mut [Lanes]) -> Self {
-        WindowRows { order: LaneOrder::new(width), rows }
+    fn new(width: usize, first: usize, rows: &'a mut [Lanes]) -> Self {
+        WindowRows { order: LaneOrder::new(width), first, rows }
     }
 
+    /// The image's row `y`.
     #[inline(always)]
-    fn row(&mut self, index: usize) -> &mut [Lanes] {
+    fn row(&mut self, y: usize) -> &mut [Lanes] {
         let length = self.order.segment + 2;
-        &mut self.rows[index * length..(index + 1) * length]
+        &mut self.rows[(y - self.first) * length..][..length]
     }
 
-    /// Rows `index` and `index + 1`.
+    /// Rows `y` and `y + 1`.
     #[inline(always)]
-    fn two_rows(&mut self, index: usize) -> (&mut [Lanes], &mut [Lanes]) {
+    fn two_rows(&mut self, y: usize) -> (&mut [Lanes], &mut [Lanes]) {
         let length = self.order.segment + 2;
-        self.rows[index * length..(index + 2) * length].split_at_mut(length)
+        self.rows[(y - self.first) * length..][..2 * length].split_at_mut(length)
     }
 
-    /// Depth changes and the forward pass over the image's rows `first..first + count`, downwards. Returns the least
-    /// and the largest finite depth in them, infinity and -infinity if there is none. There is room for the rows.
+    /// Depth changes and the forward pass over these of the image's rows, downwards; notes the depths in each. Those
+    /// before, if there are some here, have been swept down by the same `sweep`.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`, which has sixteen lanes.
+    /// As [`Windows::find`].
     #[inline(always)]
-    pub unsafe fn sweep_down<S: Simd>(
+    unsafe fn sweep_down<S: Simd>(
         &mut self,
         points: &Points,
         options: &Options,
-        (first, count): (usize, usize),
+        rows: Range<usize>,
         sweep: &mut Sweep,
-    ) -> [f32; 2] {
+        swept: &mut [Swept],
+    ) {
         let order = self.order;
-        let before = first.saturating_sub(1);
-        sweep.start(order);
+        let mut before = rows.start;
+        if rows.start == self.first {
+            sweep.start(order);
+            // This row is only tested against the first.
+            before = before.saturating_sub(1);
+        }
         let factor = options.max_depth_change_factor;
         let far = far(points.width(), points.height());
         sweep.read_z(points, order, before);
-        let mut depths = [Lanes([f32::INFINITY; LANES]), Lanes([f32::NEG_INFINITY; LANES])];
-        for y in before..first + count {
+        for y in before..rows.end {
             let last = y + 1 == points.height();
             if !last {
                 sweep.read_z(points, order, y + 1);
             }
-            // The row before the first is only tested against the first.
-            let index = (y + 1).saturating_sub(first + 1);
-            let row = &mut self.row(index)[1..];
+            let row = &mut self.row(y.max(rows.start))[1..];
             // SAFETY: as the caller's.
-            unsafe {
+            let depths = unsafe {
                 if last {
-                    sweep.start_last_row::<S>(order, y, far, row, &mut depths);
+                    sweep.start_last_row::<S>(order, y, far, row)
                 } else {
-                    sweep.start_row::<S>(points, order, y, factor, row, &mut depths);
+                    sweep.start_row::<S>(points, order, y, factor, row)
                 }
-                if y > first {
-                    let (above, row) = self.two_rows(index - 1);
-                    forward::<S>(order, above, row);
-                }
+            };
+            swept[y] = Swept { depths, side: 0.0 };
+            if y > self.first {
+                let (above, row) = self.two_rows(y - 1);
+                // SAFETY: as the caller's.
+                unsafe { forward::<S>(order, above, row) };
             }
-            close_ends(self.row(index), far);
+            close_ends(self.row(y.max(rows.start)), far);
         }
-        let [least, largest] = depths;
-        [
-            least.0.into_iter().fold(f32::INFINITY, f32::min),
-            largest.0.into_iter().fold(f32::NEG_INFINITY, f32::max),
-        ]
     }
 
-    /// The backward pass upwards over the swept rows, `first` being the image's row of the first; then the rows
-    /// hold the sides of their windows, none of which is larger than what is returned. `depths` are the least and the
-    /// largest finite depth.
+    /// The backward pass over these of the image's rows, upwards; then those before `end` hold the sides of their
+    /// windows, the largest of which is noted of each row.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`, which has sixteen lanes.
+    /// As [`Windows::find`].
     #[inline(always)]
-    pub unsafe fn sweep_up<S: Simd>(
+    unsafe fn sweep_up<S: Simd>(
         &mut self,
         points: &Points,
         options: &Options,
-        (first, count): (usize, usize),
-        depths: [f32; 2],
+        rows: Range<usize>,
+        end: usize,
         sweep: &mut Sweep,
-    ) -> f32 {
+        swept: &mut [Swept],
+    ) {
         let order = self.order;
         let far = far(points.width(), points.height());
-        let smoothing = one_smoothing(depths, options);
-        let mut largest = Lanes::ZERO;
-        for index in (0..count).rev() {
-            if index + 1 < count {
-                let (row, below) = self.two_rows(index);
+        let slice = swept[rows.start..end].iter().fold(Swept::NOTHING, |all, row| all.and(*row));
+        let smoothing = one_smoothing(slice.depths, options);
+        for y in rows.clone().rev().skip(1) {
+            let (row, below) = self.two_rows(y);
+            // SAFETY: as the caller's.
+            unsafe { backward::<S>(order, row, below, far) };
+            close_ends(row, far);
+            if y + 1 < end {
                 // SAFETY: as the caller's.
-                unsafe { backward::<S>(order, row, below, far) };
-                close_ends(row, far);
-                let y = first + index + 1;
-                // SAFETY: as the caller's.
-                unsafe {
-                    sweep.sides::<S>(points, options, smoothing, y, order, below, &mut largest)
-                };
+                let side =
+                    unsafe { sweep.sides::<S>(points, options, smoothing, y + 1, order, below) };
+                swept[y + 1].side = side;
             }
         }
-        let row = self.row(0);
+        let row = self.row(rows.start);
         // SAFETY: as the caller's.
-        unsafe { sweep.sides::<S>(points, options, smoothing, first, order, row, &mut largest) };
-        largest.0.into_iter().fold(0.0, f32::max)
+        let side = unsafe { sweep.sides::<S>(points, options, smoothing, rows.start, order, row) };
+        swept[rows.start].side = side;
     }
-}
-
-/// The sides of the windows of a row, after [`WindowRows::sweep_up`], and more that means nothing: the width rounded
-/// up to a multiple of 16, at least.
-pub(crate) fn sides(rows: &[Lanes], width: usize, index: usize) -> &[f32] {
-    let length = row_length(width);
-    floats(&rows[index * length..(index + 1) * length])
 }
 
 fn floats(row: &[Lanes]) -> &[f32] {
@@ -206,8 +358,8 @@ fn floats_mut(row: &mut [Lanes]) -> &mut [f32] {
 
 impl Sweep {
     /// Depth changes of row `y`, from its depths and those of the next row: distance 0 at depth changes, `far`
-    /// elsewhere. Keeps the changes to the row below for the next row, and the least and largest finite depths. Asks
-    /// for the points two rows below.
+    /// elsewhere. Keeps the changes to the row below for the next row. Asks for the points two rows below. Returns the
+    /// least and the largest finite depth.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`, which has sixteen lanes.
@@ -219,8 +371,7 @@ impl Sweep {
         y: usize,
         factor: f32,
         row: &mut [Lanes],
-        depths: &mut [Lanes; 2],
-    ) {
+    ) -> [f32; 2] {
         let segment = order.segment;
         let (own, next) = (Self::z_place(order, y), Self::z_place(order, y + 1));
         let (z, below) = (&self.z[own], &self.z[next]);
@@ -230,7 +381,7 @@ impl Sweep {
         unsafe {
             let far = S::splat(far(points.width(), points.height()));
             let factor = S::splat(factor);
-            let mut range = depths.map(|depth| depth.load::<S>());
+            let mut range = Swept::NOTHING.depths.map(|depth| S::splat(depth));
             let end = z[segment - 1].load::<S>();
             let end_right = z[segment].load::<S>();
             let bound = threshold::<S>(end, factor);
@@ -255,8 +406,7 @@ impl Sweep {
                 left = to_right;
                 own = right;
             }
-            depths[0].store::<S>(range[0]);
-            depths[1].store::<S>(range[1]);
+            least_and_largest::<S>(range)
         }
     }
 
@@ -271,29 +421,26 @@ impl Sweep {
         y: usize,
         far: f32,
         row: &mut [Lanes],
-        depths: &mut [Lanes; 2],
-    ) {
+    ) -> [f32; 2] {
         let z = &self.z[Self::z_place(order, y)];
         // SAFETY: as the caller's.
         unsafe {
-            let mut range = depths.map(|depth| depth.load::<S>());
+            let mut range = Swept::NOTHING.depths.map(|depth| S::splat(depth));
             for k in 0..order.segment {
                 let (above, own) = (self.above[k].load::<S>(), z[k].load::<S>());
                 row[k].store::<S>(S::and_not(above, S::splat(far)));
                 range = widened::<S>(range, own, S::finite(own));
             }
-            depths[0].store::<S>(range[0]);
-            depths[1].store::<S>(range[1]);
+            least_and_largest::<S>(range)
         }
     }
 
-    /// Replaces a row's distances by the sides of its windows, pixel by pixel, and keeps the `largest`. `smoothing` as
-    /// [`one_smoothing`] says.
+    /// Replaces a row's distances by the sides of its windows, pixel by pixel; none is larger than what is returned.
+    /// `smoothing` as [`one_smoothing`] says.
     ///
     /// # Safety
     /// As [`Sweep::start_row`].
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
     unsafe fn sides<S: Simd>(
         &mut self,
         points: &Points,
@@ -302,14 +449,14 @@ impl Sweep {
         y: usize,
         order: LaneOrder,
         row: &mut [Lanes],
-        largest: &mut Lanes,
-    ) {
+    ) -> f32 {
         let segment = order.segment;
         if smoothing.is_none() {
             self.read_z(points, order, y);
         }
         let z = &self.z[Self::z_place(order, y)];
         let (distances, sides) = (&row[1..=segment], &mut self.sides[..segment]);
+        let mut largest = Lanes::ZERO;
         // SAFETY: as the caller's; the sides fit i32.
         unsafe {
             let side = |distance, smoothing| {
@@ -317,7 +464,7 @@ impl Sweep {
                 let whole = S::truncate(S::min(smallest, S::splat(LARGEST)));
                 S::and(S::lt(S::splat(SMALLEST), smallest), whole)
             };
-            let mut so_far = largest.load::<S>();
+            let mut so_far = S::splat(0.0);
             if let Some(smoothing) = smoothing {
                 let smoothing = S::splat(smoothing);
                 for k in 0..segment {
@@ -349,6 +496,7 @@ impl Sweep {
         }
         row[..border].fill(0.0);
         row[order.width - border..order.width].fill(0.0);
+        largest.0.into_iter().fold(0.0, f32::max)
     }
 }
 
@@ -372,6 +520,25 @@ unsafe fn widened<S: Simd>([least, largest]: [S::F; 2], z: S::F, finite: S::F) -
         let z = S::or(S::and_not(finite, S::splat(f32::NAN)), z);
         [S::min(z, least), S::max(z, largest)]
     }
+}
+
+/// The least of the first lanes, and the largest of the others.
+///
+/// # Safety
+/// The processor has the instruction set of `S`, which has sixteen lanes.
+#[inline(always)]
+unsafe fn least_and_largest<S: Simd>([least, largest]: [S::F; 2]) -> [f32; 2] {
+    let mut lanes = [Lanes::ZERO; 2];
+    // SAFETY: as the caller's.
+    unsafe {
+        lanes[0].store::<S>(least);
+        lanes[1].store::<S>(largest);
+    }
+    let [least, largest] = lanes;
+    [
+        least.0.into_iter().fold(f32::INFINITY, f32::min),
+        largest.0.into_iter().fold(f32::NEG_INFINITY, f32::max),
+    ]
 }
 
 /// `depth_change::threshold`
@@ -574,26 +741,27 @@ mod tests {
                 let changes = depth_change_map(&points, options.max_depth_change_factor).unwrap();
                 let distances = distance_map(&changes, width, height).unwrap();
 
-                let mut rows = vec![Lanes::ZERO; row_length(width) * height];
-                let mut windows = WindowRows::new(width, &mut rows);
-                let mut sweep = Sweep::default();
-                sweep.reserve(width).unwrap();
-                let swept = (0, height);
-                // SAFETY: the portable path runs everywhere.
-                let largest = unsafe {
-                    let depths = windows.sweep_down::<S>(&points, &options, swept, &mut sweep);
-                    windows.sweep_up::<S>(&points, &options, swept, depths, &mut sweep)
-                };
-                for y in 0..height {
-                    for x in 0..width {
-                        let expected =
-                            window_side(distances[y * width + x], points.z(x, y), &options);
-                        assert_eq!(
-                            sides(&rows, width, y)[x],
-                            expected as f32,
-                            "{width}x{height} {x},{y}"
-                        );
-                        assert!(expected as f32 <= largest);
+                // Slices in their order, and one that another follows.
+                let cuts = [0, height / 3, height / 2, height];
+                let in_order = cuts.windows(2).map(|cut| cut[0]..cut[1]);
+                let in_order = in_order.filter(|slice| !slice.is_empty());
+                let slices = in_order.chain([height / 2..height, 0..height / 2]);
+                let mut windows = Windows::default();
+                windows.start(&points, &options, 1).unwrap();
+                for slice in slices {
+                    // SAFETY: the portable path runs everywhere.
+                    unsafe { windows.find::<S>(&points, &options, slice.clone()) }.unwrap();
+                    let sides = windows.sides(width);
+                    for y in slice {
+                        let mut largest = 0;
+                        for x in 0..width {
+                            let expected =
+                                window_side(distances[y * width + x], points.z(x, y), &options);
+                            let what = format!("{width}x{height} {x},{y}");
+                            assert_eq!(sides.row(y)[x], expected as f32, "{what}");
+                            largest = largest.max(expected);
+                        }
+                        assert!(largest as f32 <= windows.swept(y..y + 1).side);
                     }
                 }
             }

@@ -23,11 +23,11 @@ use windows::{Rows, Sweep, reach};
 use super::buffer::Buffer;
 use super::paths::{self, Task};
 use super::sink::Sink;
-use super::{Chunk, Parts, lock, read_map, share_out};
+use super::{Parts, lock};
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
-use crate::memory::resize;
+use crate::memory::{bytes, make_room, resize};
 use crate::options::{DistanceMetric, Method, Options};
 use crate::paper::{Asked, BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, PaperMaps};
 use crate::simd::{GROUP, Groups};
@@ -48,12 +48,13 @@ const RING_BYTES: usize = 4 << 20;
 pub(crate) struct Scratch {
     depths: Buffer<f32>,
     radii: Buffer<f32>,
+    chunks: Vec<Chunk>,
 }
 
 impl Scratch {
     /// Bytes held.
     pub fn size(&self) -> usize {
-        self.depths.size() + self.radii.size()
+        self.depths.size() + self.radii.size() + bytes(&self.chunks)
     }
 }
 
@@ -99,8 +100,13 @@ pub(crate) fn compute_with_radii(
 ) -> Result<(), Error> {
     compute(isa, points, options, None, normals, scratch)?;
     let length = row_length(points.width());
-    let (map, size) = (&scratch.paper.radii, (points.width(), points.height()));
-    read_map(&scratch.chunks, size, radii, |place| &map[place * length..][..length])
+    let Scratch { chunks, radii: map, .. } = &scratch.paper;
+    make_room(radii, points.width() * points.height())?;
+    for place in chunks.iter().flat_map(|chunk| chunk.own.clone().map(|y| chunk.place(y))) {
+        let row = &map[place * length..][..points.width()];
+        radii.extend(row.iter().map(|radius| *radius as u32));
+    }
+    Ok(())
 }
 
 /// The normals of the blocks whose middle pixel has a window of one of these radii; NaN for the others.
@@ -160,7 +166,39 @@ pub(crate) fn choices(
 ) -> Result<(), Error> {
     let rows = choices.chunks_mut(BLOCK * even.cloud.width).enumerate();
     // SAFETY: the processor has the instruction set.
-    workers.share(rows, |rows| unsafe { paths::run(isa, ChoicesTask { even, rows }) })
+    workers.share(rows, |_, rows| unsafe { paths::run(isa, ChoicesTask { even, rows }) })
+}
+
+/// Image rows that are swept together, with the rows around them whose depth changes reach them.
+#[derive(Clone, Debug)]
+struct Chunk {
+    own: Range<usize>,
+    swept: Range<usize>,
+    /// Where the swept rows start among the rows of the map.
+    start: usize,
+}
+
+impl Chunk {
+    /// Which of the map's rows an own row of the chunk is.
+    fn place(&self, y: usize) -> usize {
+        self.start + y - self.swept.start
+    }
+}
+
+/// The rows shared out to `count` sweeps. A depth change more than `reach` away decides no window, so each sweep can
+/// start and end that far around its own rows.
+fn share_out(height: usize, count: usize, reach: usize, chunks: &mut Vec<Chunk>) {
+    let per_chunk = height.div_ceil(count);
+    let per_chunk = if per_chunk < 2 * reach { height } else { per_chunk };
+    let mut start = 0;
+    let first_rows = (0..height).step_by(per_chunk);
+    chunks.clear();
+    chunks.extend(first_rows.map(|first| {
+        let own = first..(first + per_chunk).min(height);
+        let swept = own.start.saturating_sub(reach)..(own.end + reach).min(height);
+        start += swept.len();
+        Chunk { own, start: start - swept.len(), swept }
+    }));
 }
 
 /// The image in tiles of like sizes.
@@ -243,15 +281,16 @@ impl<'a> Job<'a> {
     #[inline(never)]
     fn radii(&self, scratch: &mut super::Scratch) -> Result<usize, Error> {
         let &Job { points, options, .. } = self;
-        let super::Scratch { workers, each, chunks, paper, .. } = scratch;
+        let super::Scratch { workers, each, paper, .. } = scratch;
+        let Scratch { depths, radii, chunks } = paper;
         let (width, height) = (points.width(), points.height());
         let (count, length) = (workers.count(), row_length(width));
         let reach = if count > 1 { reach(&options.paper) } else { height };
         share_out(height, count, reach, chunks);
         let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
-        paper.radii.grow(swept * length)?;
-        let depths = &paper.depths[..length * height];
-        let radii = &mut paper.radii[..swept * length];
+        radii.grow(swept * length)?;
+        let depths = &depths[..length * height];
+        let radii = &mut radii[..swept * length];
         let largest = AtomicU32::new(0);
         if options.paper.distance_metric == DistanceMetric::Euclidean {
             for scratch in &each[..count] {
@@ -286,12 +325,12 @@ impl<'a> Job<'a> {
 
     /// As [`Job::radii`], of radii of blocks that are there.
     fn given_radii(&self, scratch: &mut super::Scratch, given: &[u32]) -> Result<usize, Error> {
-        let super::Scratch { chunks, paper, .. } = scratch;
+        let Scratch { radii, chunks, .. } = &mut scratch.paper;
         let Blocks { across, down, .. } = Blocks::of(self.points.width(), self.points.height());
         let length = row_length(across);
         share_out(down, 1, down, chunks);
-        paper.radii.grow(down * length)?;
-        for (to, from) in paper.radii.chunks_mut(length).zip(given.chunks(across)) {
+        radii.grow(down * length)?;
+        for (to, from) in radii.chunks_mut(length).zip(given.chunks(across)) {
             for (to, from) in to.iter_mut().zip(from) {
                 *to = *from as f32;
             }
@@ -311,11 +350,11 @@ impl<'a> Job<'a> {
         step: usize,
     ) -> Result<(), Error> {
         let &Job { points, options, whole_points, .. } = self;
-        let super::Scratch { workers, each, listed, chunks, paper, .. } = scratch;
+        let super::Scratch { workers, each, listed, paper, .. } = scratch;
         let (width, height) = (points.width(), points.height());
         let [length, radii_length] = [width, width.div_ceil(step)].map(row_length);
         let sink = Sink::new(normals, indices, width, listed)?;
-        let (depths, radii, chunks) = (&paper.depths, &paper.radii, &*chunks);
+        let Scratch { depths, radii, chunks } = &*paper;
         let row = |y: usize| {
             let row = y / step;
             let at = chunks[row / chunks[0].own.len()].place(row) * radii_length;
