@@ -36,6 +36,30 @@ impl Lanes {
         lanes
     }
 
+    /// The least lane; none is NaN.
+    #[inline(always)]
+    pub fn least(self) -> f32 {
+        self.best(|a, b| if a < b { a } else { b })
+    }
+
+    /// The largest lane; none is NaN.
+    #[inline(always)]
+    pub fn largest(self) -> f32 {
+        self.best(|a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn best(self, better: impl Fn(f32, f32) -> f32) -> f32 {
+        let mut lanes = self.0;
+        // By halves, which are vectors.
+        for half in [8, 4, 2, 1] {
+            for lane in 0..half {
+                lanes[lane] = better(lanes[lane], lanes[lane + half]);
+            }
+        }
+        lanes[0]
+    }
+
     /// As many of the first as `S` has lanes.
     ///
     /// # Safety

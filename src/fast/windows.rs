@@ -496,7 +496,7 @@ impl Sweep {
         }
         row[..border].fill(0.0);
         row[order.width - border..order.width].fill(0.0);
-        largest.0.into_iter().fold(0.0, f32::max)
+        largest.largest()
     }
 }
 
@@ -534,11 +534,7 @@ unsafe fn least_and_largest<S: Simd>([least, largest]: [S::F; 2]) -> [f32; 2] {
         lanes[0].store::<S>(least);
         lanes[1].store::<S>(largest);
     }
-    let [least, largest] = lanes;
-    [
-        least.0.into_iter().fold(f32::INFINITY, f32::min),
-        largest.0.into_iter().fold(f32::NEG_INFINITY, f32::max),
-    ]
+    [lanes[0].least(), lanes[1].largest()]
 }
 
 /// `depth_change::threshold`
