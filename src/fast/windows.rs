@@ -327,22 +327,20 @@ impl<'a> WindowRows<'a> {
         let far = far(points.width(), points.height());
         let slice = swept[rows.start..end].iter().fold(Swept::NOTHING, |all, row| all.and(*row));
         let smoothing = one_smoothing(slice.depths, options);
-        for y in rows.clone().rev().skip(1) {
-            let (row, below) = self.two_rows(y);
-            // SAFETY: as the caller's.
-            unsafe { backward::<S>(order, row, below, far) };
-            close_ends(row, far);
-            if y + 1 < end {
+        for y in rows.clone().rev() {
+            if y > rows.start {
+                let (row, below) = self.two_rows(y - 1);
                 // SAFETY: as the caller's.
-                let side =
-                    unsafe { sweep.sides::<S>(points, options, smoothing, y + 1, order, below) };
-                swept[y + 1].side = side;
+                unsafe { backward::<S>(order, row, below, far) };
+                close_ends(row, far);
+            }
+            if y < end {
+                let row = self.row(y);
+                // SAFETY: as the caller's.
+                swept[y].side =
+                    unsafe { sweep.sides::<S>(points, options, smoothing, y, order, row) };
             }
         }
-        let row = self.row(rows.start);
-        // SAFETY: as the caller's.
-        let side = unsafe { sweep.sides::<S>(points, options, smoothing, rows.start, order, row) };
-        swept[rows.start].side = side;
     }
 }
 
@@ -459,16 +457,11 @@ impl Sweep {
         let mut largest = Lanes::ZERO;
         // SAFETY: as the caller's; the sides fit i32.
         unsafe {
-            let side = |distance, smoothing| {
-                let smallest = S::min(distance, smoothing);
-                let whole = S::truncate(S::min(smallest, S::splat(LARGEST)));
-                S::and(S::lt(S::splat(SMALLEST), smallest), whole)
-            };
             let mut so_far = S::splat(0.0);
             if let Some(smoothing) = smoothing {
                 let smoothing = S::splat(smoothing);
                 for k in 0..segment {
-                    let side = side(distances[k].load::<S>(), smoothing);
+                    let side = side::<S>(distances[k].load::<S>(), smoothing);
                     so_far = S::max(side, so_far);
                     sides[k].store::<S>(side);
                 }
@@ -477,7 +470,7 @@ impl Sweep {
                 for k in 0..segment {
                     points.prefetch(y.wrapping_sub(1), k * LANES, LANES);
                     let smoothing = S::add(size, S::div(z[k].load::<S>(), ten));
-                    let side = side(distances[k].load::<S>(), smoothing);
+                    let side = side::<S>(distances[k].load::<S>(), smoothing);
                     so_far = S::max(side, so_far);
                     sides[k].store::<S>(side);
                 }
@@ -497,6 +490,20 @@ impl Sweep {
         row[..border].fill(0.0);
         row[order.width - border..order.width].fill(0.0);
         largest.largest()
+    }
+}
+
+/// `smoothing_area::window_side`, with nothing ignored.
+///
+/// # Safety
+/// The processor has the instruction set of `S`; the sides fit i32.
+#[inline(always)]
+unsafe fn side<S: Simd>(distance: S::F, smoothing: S::F) -> S::F {
+    // SAFETY: as the caller's.
+    unsafe {
+        let smallest = S::min(distance, smoothing);
+        let whole = S::truncate(S::min(smallest, S::splat(LARGEST)));
+        S::and(S::lt(S::splat(SMALLEST), smallest), whole)
     }
 }
 
