@@ -28,7 +28,8 @@ pub enum Error {
     Unsupported = 8,
     /// An index is negative or not below width x height.
     Index = 9,
-    /// Scratch memory could not be allocated.
+    /// Scratch memory could not be allocated. Nothing is written then, or NaN everywhere where depths in the middle of a
+    /// frame turn out to need more memory than there is.
     OutOfMemory = 10,
     /// The worker threads asked for could not be started.
     Threads = 11,

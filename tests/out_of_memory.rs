@@ -1,4 +1,5 @@
-//! Memory that is not there is an error, whatever it was for; nothing is written then, and nothing is broken.
+//! Memory that is not there is an error, whatever it was for; nothing is broken then, and nothing is written, or NaN
+//! everywhere where it is missed in the middle of a frame.
 
 mod clouds;
 
@@ -78,12 +79,47 @@ fn all_options() -> Vec<Options> {
 // One test: the limit is for all threads.
 #[test]
 fn memory_that_is_not_there_is_an_error() {
+    missed_in_the_middle();
     for (isa, width, height) in [(Isa::active(), 320, 240), (Isa::Scalar, 76, 54)] {
         let cloud = Cloud::new(Kind::NanBlocks, width, height, 20);
         for options in all_options() {
             normals(isa, &cloud, &options);
             maps(isa, &cloud, &options);
         }
+    }
+}
+
+/// The lower half is so much deeper that its windows need more memory than the upper half's.
+fn missed_in_the_middle() {
+    let mut cloud = Cloud::new(Kind::NanBlocks, 120, 400, 21);
+    let half = cloud.points.len() / 2;
+    for coordinate in cloud.points[half..].as_flattened_mut() {
+        *coordinate *= 300.0;
+    }
+    for method in methods() {
+        let options = options(method, 10.0, true);
+        let expected = compute(&mut Estimator::new(options.clone()), &cloud);
+        let mut found = vec![[7.0; 4]; cloud.points.len()];
+        let mut none = 0;
+        until_there_is_enough(
+            || {
+                found.fill([7.0; 4]);
+                let result = compute_to(&mut found, &mut Estimator::new(options.clone()), &cloud);
+                if result.is_err() {
+                    let all = found.as_flattened();
+                    let are_none = all.iter().all(|c| c.is_nan());
+                    none += usize::from(are_none);
+                    assert!(
+                        are_none || all.iter().all(|c| *c == 7.0),
+                        "{method:?}: partial output"
+                    );
+                }
+                result
+            },
+            "two depths",
+        );
+        assert!(none > 0, "{method:?}: never in the middle");
+        assert_same_bits(&found, &expected, cloud.width, "two depths");
     }
 }
 

@@ -66,7 +66,8 @@
 #define IINE_ERROR_INDEX 9
 
 /**
- * Memory could not be allocated.
+ * Memory could not be allocated. Normals are not written then, or NaN everywhere where depths in the middle of a frame
+ * turn out to need more memory than there is.
  */
 #define IINE_ERROR_OUT_OF_MEMORY 10
 
@@ -332,8 +333,8 @@ void iine_estimator_free(struct iine_estimator *estimator);
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_STRUCT_SIZE, IINE_ERROR_SIZE, IINE_ERROR_STRIDE,
  * IINE_ERROR_MISALIGNED, IINE_ERROR_OVERLAP, IINE_ERROR_UNSUPPORTED, IINE_ERROR_OUT_OF_MEMORY,
- * IINE_ERROR_THREADS. Nothing is written then. IINE_ERROR_UNSUPPORTED is for IINE_METHOD_SIMPLE_3D_GRADIENT with
- * IINE_BORDER_POLICY_MIRROR or IINE_SEMANTICS_PAPER.
+ * IINE_ERROR_THREADS. Nothing is written then; as to IINE_ERROR_OUT_OF_MEMORY, see there. IINE_ERROR_UNSUPPORTED is for
+ * IINE_METHOD_SIMPLE_3D_GRADIENT with IINE_BORDER_POLICY_MIRROR or IINE_SEMANTICS_PAPER.
  *
  * # Safety
  * The pointers are NULL or valid as their structs say, for the whole call; no other thread uses `estimator` or

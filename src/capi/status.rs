@@ -40,7 +40,8 @@ pub const IINE_ERROR_OPTION_VALUE: i32 = 7;
 pub const IINE_ERROR_UNSUPPORTED: i32 = 8;
 /// An index is negative or not below width x height.
 pub const IINE_ERROR_INDEX: i32 = 9;
-/// Memory could not be allocated.
+/// Memory could not be allocated. Normals are not written then, or NaN everywhere where depths in the middle of a frame
+/// turn out to need more memory than there is.
 pub const IINE_ERROR_OUT_OF_MEMORY: i32 = 10;
 /// The worker threads asked for could not be started.
 pub const IINE_ERROR_THREADS: i32 = 11;

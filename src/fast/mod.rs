@@ -54,7 +54,8 @@ use crate::window::Image;
 pub(crate) const SIZES: RangeInclusive<usize> = 3..=1 << 24;
 
 /// Rows of a strip, and of its tiles, at most: those around it that its windows reach are read again for the next one.
-const STRIP_ROWS: usize = 128;
+/// With more, large images' points have left the cache between the sweeps and the tiles.
+const STRIP_ROWS: usize = 160;
 
 /// A slice has so many times as many rows as its windows reach, at least: the sweep up starts that far below it.
 const SLICE_REACHES: usize = 4;
