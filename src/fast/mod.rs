@@ -222,7 +222,7 @@ fn compute_slices(
     scratch.prepare(options.threads)?;
     let Scratch { workers, each, listed, last_reach, .. } = scratch;
     let (width, height) = (points.width(), points.height());
-    let strips = height.div_ceil(STRIP_ROWS);
+    let strips = strips(height);
     let least_reach = reach(points, options, 0.0);
     let slice_rows = SLICE_REACHES * least_reach.max(*last_reach);
     let is_depth = options.method == Method::AverageDepthChange;
@@ -246,7 +246,7 @@ fn compute_slices(
     }
     let sink = Sink::new(normals, indices, width, listed)?;
     let reach = AtomicUsize::new(0);
-    let chunks = chunks(strips, workers.count());
+    let chunks = chunks(strips, job.per_slice, workers.count());
     let done = workers.share(chunks, |worker, chunks| {
         let WorkerScratch { windows, sums, .. } = &mut *lock(&each[worker]);
         for chunk in chunks {
@@ -280,14 +280,23 @@ fn write_none(normals: &Normals) {
     }
 }
 
-/// The strips of an image in chunks for the workers: ever fewer at a time, so that all end at the same time.
-fn chunks(strips: usize, workers: usize) -> impl Iterator<Item = Range<usize>> {
+/// How many strips an image has: two threads have as many each.
+fn strips(height: usize) -> usize {
+    let strips = height.div_ceil(STRIP_ROWS);
+    if strips > 1 { strips.next_multiple_of(2) } else { strips }
+}
+
+/// The strips of an image in chunks for the workers: ever fewer at a time, so that all end at the same time; as many for
+/// each where a slice is that large.
+fn chunks(strips: usize, per_slice: usize, workers: usize) -> impl Iterator<Item = Range<usize>> {
+    let share = strips.div_ceil(workers);
     let mut left = 0..strips;
     std::iter::from_fn(move || {
-        let count = if workers == 1 { left.len() } else { left.len().div_ceil(2 * workers) };
-        let chunk = left.start..left.start + count;
+        let some = left.len().div_ceil(2 * workers);
+        let count = if workers == 1 || per_slice >= share { share } else { some };
+        let chunk = left.start..(left.start + count).min(strips);
         left.start = chunk.end;
-        (count > 0).then_some(chunk)
+        (!chunk.is_empty()).then_some(chunk)
     })
 }
 
