@@ -53,9 +53,11 @@ use crate::window::Image;
 /// Columns and rows of the images that are not left to the plain form. Floats hold them.
 pub(crate) const SIZES: RangeInclusive<usize> = 3..=1 << 24;
 
-/// Rows of a strip, and of its tiles, at most: those around it that its windows reach are read again for the next one.
-/// With more, large images' points have left the cache between the sweeps and the tiles.
+/// Rows of a strip, and of its tiles: as many as `STRIP_PIXELS` are, between the two. With fewer, more of the rows around
+/// it, which its windows reach, are read again; with more, points have left the cache between the sweeps and the tiles.
 const STRIP_ROWS: usize = 160;
+const LEAST_STRIP_ROWS: usize = 96;
+const STRIP_PIXELS: usize = 1 << 18;
 
 /// A slice has so many times as many rows as its windows reach, at least: the sweep up starts that far below it.
 const SLICE_REACHES: usize = 4;
@@ -222,7 +224,7 @@ fn compute_slices(
     scratch.prepare(options.threads)?;
     let Scratch { workers, each, listed, last_reach, .. } = scratch;
     let (width, height) = (points.width(), points.height());
-    let strips = strips(height);
+    let strips = strips(width, height);
     let least_reach = reach(points, options, 0.0);
     let slice_rows = SLICE_REACHES * least_reach.max(*last_reach);
     let is_depth = options.method == Method::AverageDepthChange;
@@ -234,14 +236,14 @@ fn compute_slices(
         whole_points: points.has_whole_points(normals),
         spacing: if is_depth { spacing(points) } else { 0.0 },
         strips,
-        per_slice: slice_rows.div_ceil(STRIP_ROWS).min(strips),
+        per_slice: slice_rows.div_ceil(height / strips).min(strips),
     };
     // Nothing is written if there is no memory for what is known already.
     let columns = job.columns(true, least_reach);
     let side = Frame::most_of_ring(least_reach - 2).min(width.min(height));
     for scratch in &each[..workers.count()] {
         let WorkerScratch { windows, sums, .. } = &mut *lock(scratch);
-        windows.start(points, options, job.per_slice * STRIP_ROWS)?;
+        windows.start(points, options, job.row(job.per_slice))?;
         sums.reserve(&job, true, columns, side)?;
     }
     let sink = Sink::new(normals, indices, width, listed)?;
@@ -281,8 +283,8 @@ fn write_none(normals: &Normals) {
 }
 
 /// How many strips an image has: two threads have as many each.
-fn strips(height: usize) -> usize {
-    let strips = height.div_ceil(STRIP_ROWS);
+fn strips(width: usize, height: usize) -> usize {
+    let strips = height.div_ceil((STRIP_PIXELS / width).clamp(LEAST_STRIP_ROWS, STRIP_ROWS));
     if strips > 1 { strips.next_multiple_of(2) } else { strips }
 }
 
@@ -319,7 +321,8 @@ impl<T> Parts<T> {
 impl Job<'_> {
     /// Where a strip starts: strips are of like heights.
     fn row(&self, strip: usize) -> usize {
-        strip * self.image.height / self.strips
+        let (rows, rest) = (self.image.height / self.strips, self.image.height % self.strips);
+        strip * rows + strip.min(rest)
     }
 
     // Not inlined, as the next one: profiles and the test of instruction counts tell the two by name.
