@@ -1,7 +1,7 @@
 //! The depths of a row of points, missing ones NaN.
 
 use crate::cloud::Points;
-use crate::fast::lanes::LANES;
+use crate::fast::lanes::{LANES, Lanes};
 use crate::options::{Depth, Options};
 use crate::simd::Along;
 
@@ -10,7 +10,7 @@ pub(crate) fn row_length(width: usize) -> usize {
     width.next_multiple_of(LANES) + LANES
 }
 
-/// Fills a row of depths.
+/// Fills a row of depths; returns the least and the largest of their magnitudes.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
@@ -21,7 +21,7 @@ pub(crate) unsafe fn read<S: Along>(
     y: usize,
     whole_points: bool,
     depths: &mut [f32],
-) {
+) -> [f32; 2] {
     let width = points.width();
     let range = options.paper.depth == Depth::Range;
     let depths = &mut depths[..row_length(width)];
@@ -30,6 +30,7 @@ pub(crate) unsafe fn read<S: Along>(
     unsafe {
         let none = S::splat(f32::NAN);
         let zero = S::splat(0.0);
+        let (mut nearest, mut deepest) = (S::splat(f32::INFINITY), zero);
         for x in (0..width).step_by(S::LANES) {
             let [px, py, pz] = points.lanes::<S>(x);
             let mut there = S::and(S::and(S::finite(px), S::finite(py)), S::finite(pz));
@@ -43,7 +44,15 @@ pub(crate) unsafe fn read<S: Along>(
                 pz
             };
             S::store(depths.as_mut_ptr().add(x), S::select(there, depth, none));
+            let magnitude = S::abs(depth);
+            nearest = S::min(S::select(there, magnitude, nearest), nearest);
+            deepest = S::max(S::and(there, magnitude), deepest);
         }
+        depths[width..].fill(f32::NAN);
+        let mut lanes = [Lanes([f32::INFINITY; LANES]), Lanes::ZERO];
+        for (to, lane) in lanes.iter_mut().zip([nearest, deepest]) {
+            S::store(to.0.as_mut_ptr(), lane);
+        }
+        [lanes[0].least(), lanes[1].largest()]
     }
-    depths[width..].fill(f32::NAN);
 }

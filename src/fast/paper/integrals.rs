@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::layers::Layer;
 use crate::Error;
 use crate::cloud::Points;
 use crate::fast::buffer::Buffer;
@@ -9,7 +10,7 @@ use crate::fast::lanes::transpose4;
 use crate::paper::{BLOCK, inverse_depth};
 use crate::simd::{GROUP, Groups};
 
-/// x, y, z, and 1; zeros for a missing point.
+/// x, y, z, and the weight: 1, or next to nothing for a hidden point (`layers`); zeros for a missing one.
 pub(crate) type Counted = [f32; 4];
 
 /// What is summed: `N` channels of a pixel.
@@ -30,6 +31,9 @@ pub(crate) struct Rings<const N: usize> {
     pub rows: usize,
     /// The largest magnitude of a coordinate read so far.
     pub largest: f32,
+    pub layer: Layer,
+    /// The least magnitude of depth of the points hidden so far.
+    pub nearest_hidden: f32,
 }
 
 /// The columns or rows, of so many, that windows of those in `range` reach at a distance from their pixels at most.
@@ -65,9 +69,10 @@ impl<const N: usize> Rings<N> {
         self.sums.grow(length)
     }
 
-    /// Starts over at row `top`, with rings of so many rows; there is room.
-    pub fn start(&mut self, columns: Range<usize>, top: usize, rows: usize) {
+    /// Starts over at row `top` of a layer's points, with rings of so many rows; there is room.
+    pub fn start(&mut self, columns: Range<usize>, top: usize, rows: usize, layer: &Layer) {
         (self.columns, self.largest, self.rows) = (columns, 0.0, rows);
+        (self.layer, self.nearest_hidden) = (*layer, f32::INFINITY);
         let length = self.rows * self.stride();
         self.points[..length].fill([0.0; 4]);
         let above = self.row(top + self.rows - 1);
@@ -129,8 +134,8 @@ impl<const N: usize> Rings<N> {
         unsafe {
             let mut largest = S::splat(self.largest);
             for x in (0..length).step_by(GROUP) {
-                let depths = S::load(depths.as_ptr().add(self.columns.start + x));
-                let there = S::eq(depths, depths);
+                let there = S::abs(S::load(depths.as_ptr().add(self.columns.start + x)));
+                let there = S::lt(there, S::splat(self.layer.end));
                 let point = points.lanes::<S>(x);
                 let mut fields = [[0.0; GROUP]; 4];
                 for c in 0..3 {
@@ -148,6 +153,22 @@ impl<const N: usize> Rings<N> {
             self.largest = lanes.into_iter().fold(0.0, f32::max);
         }
         to[count..].fill([0.0; 4]);
+        if self.layer.hides_some() {
+            self.hide(depths, y);
+        }
+    }
+
+    /// Hides the points of row `y` that are not in the layer.
+    #[cold]
+    fn hide(&mut self, depths: &[f32], y: usize) {
+        let row = self.row(y);
+        let depths = &depths[self.columns.clone()];
+        for (to, depth) in self.points[row][1..].iter_mut().zip(depths) {
+            if depth.abs() >= self.layer.end {
+                *to = self.layer.hidden;
+                self.nearest_hidden = self.nearest_hidden.min(depth.abs());
+            }
+        }
     }
 
     /// Reads row `y`, of which `depths` are the image's, as points: column, row and inverse depth.

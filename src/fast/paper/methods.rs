@@ -25,6 +25,9 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
     /// and no coordinate is above `largest`.
     fn error(total: [f64; N], count: usize, largest: f32) -> f64;
 
+    /// Of eight windows' sums, those of weights.
+    fn weights<S: Simd>(sums: &[Doubles<S>; N]) -> [Doubles<S>; 2];
+
     /// Notes what the normals of eight pixels, `at` in their run, are made from: the sums over their windows. Only
     /// these `lanes` mean something.
     ///
@@ -104,6 +107,11 @@ impl Sums<MOMENTS> for CovarianceMatrix {
 
     fn error(total: [f64; MOMENTS], _: usize, _: f32) -> f64 {
         ROUNDING * (total[4] + total[5] + total[6])
+    }
+
+    #[inline(always)]
+    fn weights<S: Simd>(sums: &[Doubles<S>; MOMENTS]) -> [Doubles<S>; 2] {
+        [sums[3], sums[3]]
     }
 
     #[inline(always)]
@@ -206,6 +214,11 @@ impl Sums<8> for Gradients {
     }
 
     #[inline(always)]
+    fn weights<S: Simd>(sums: &[Doubles<S>; 8]) -> [Doubles<S>; 2] {
+        [sums[3], sums[7]]
+    }
+
+    #[inline(always)]
     unsafe fn note<S: Groups>(
         sums: &[Doubles<S>; 8],
         _: &Rects,
@@ -249,6 +262,11 @@ impl Sums<4> for SmoothedDepthChanges {
 
     fn error(_: [f64; 4], count: usize, largest: f32) -> f64 {
         error_of_differences(count, largest)
+    }
+
+    #[inline(always)]
+    fn weights<S: Simd>(sums: &[Doubles<S>; 4]) -> [Doubles<S>; 2] {
+        [sums[1], sums[3]]
     }
 
     #[inline(always)]
@@ -309,9 +327,9 @@ unsafe fn outermost<S: Groups>(
         }
         for lane in Bits(missing) {
             let one = rects.outermost(line, lane, points);
-            for c in 0..3 {
-                fields[c][lane] = one[c];
-            }
+            let [dx, dy, span] =
+                one.map_or([0.0; 3], |([a, b], span)| [b[0] - a[0], b[1] - a[1], span]);
+            (fields[0][lane], fields[1][lane], fields[2][lane]) = (dx, dy, span);
         }
         let load = |c: usize| Floats::load(fields[c].as_ptr());
         [load(0), load(1), load(2)]

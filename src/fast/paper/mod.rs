@@ -1,10 +1,12 @@
 //! The paper's windows and methods, fast: depths (`depths`), the radii of the windows of the whole image (`windows`),
-//! then tile by tile integral images of the method's channels (`integrals`, `methods`) and the normals (`tile`).
+//! then tile by tile, and if need be layer by layer (`layers`), integral images of the method's channels (`integrals`,
+//! `methods`) and the normals (`tile`).
 
 mod choices;
 mod depths;
 mod even_windows;
 mod integrals;
+mod layers;
 mod methods;
 mod rects;
 mod tile;
@@ -15,7 +17,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use depths::row_length;
 use even_windows::EvenTile;
-use integrals::{Rings, rows_of_rings};
+use integrals::{Rings, reached, rows_of_rings};
+use layers::{Layer, Waiting};
 use methods::{CovarianceMatrix, Gradients, MOMENTS, SmoothedDepthChanges};
 use tile::Tile;
 use windows::{Rows, Sweep, reach};
@@ -47,6 +50,8 @@ const RING_BYTES: usize = 4 << 20;
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     depths: Buffer<f32>,
+    /// Row by row the least and the largest of their magnitudes.
+    ranges: Vec<[f32; 2]>,
     radii: Buffer<f32>,
     chunks: Vec<Chunk>,
 }
@@ -54,7 +59,7 @@ pub(crate) struct Scratch {
 impl Scratch {
     /// Bytes held.
     pub fn size(&self) -> usize {
-        self.depths.size() + self.radii.size() + bytes(&self.chunks)
+        self.depths.size() + bytes(&self.ranges) + self.radii.size() + bytes(&self.chunks)
     }
 }
 
@@ -65,12 +70,17 @@ pub(crate) struct WorkerScratch {
     moments: Rings<MOMENTS>,
     gradients: Rings<8>,
     depth_changes: Rings<4>,
+    waiting: Waiting,
 }
 
 impl WorkerScratch {
     /// Bytes held.
     pub fn size(&self) -> usize {
-        self.sweep.size() + self.moments.size() + self.gradients.size() + self.depth_changes.size()
+        self.sweep.size()
+            + self.moments.size()
+            + self.gradients.size()
+            + self.depth_changes.size()
+            + self.waiting.size()
     }
 }
 
@@ -268,11 +278,12 @@ impl<'a> Job<'a> {
         let super::Scratch { workers, paper, .. } = scratch;
         let length = row_length(points.width());
         paper.depths.grow(length * points.height())?;
-        let rows = paper.depths[..length * points.height()].chunks_mut(length).enumerate();
-        workers.each(rows, |(y, depths)| {
+        resize(&mut paper.ranges, points.height(), [0.0; 2])?;
+        let rows = paper.depths[..length * points.height()].chunks_mut(length);
+        workers.each(rows.zip(&mut paper.ranges).enumerate(), |(y, (depths, range))| {
             let task = DepthsTask { points, options, y, whole_points, depths };
             // SAFETY: the processor has the instruction set.
-            unsafe { paths::run(self.isa, task) };
+            *range = unsafe { paths::run(self.isa, task) };
         });
         Ok(())
     }
@@ -282,7 +293,7 @@ impl<'a> Job<'a> {
     fn radii(&self, scratch: &mut super::Scratch) -> Result<usize, Error> {
         let &Job { points, options, .. } = self;
         let super::Scratch { workers, each, paper, .. } = scratch;
-        let Scratch { depths, radii, chunks } = paper;
+        let Scratch { depths, radii, chunks, .. } = paper;
         let (width, height) = (points.width(), points.height());
         let (count, length) = (workers.count(), row_length(width));
         let reach = if count > 1 { reach(&options.paper) } else { height };
@@ -354,7 +365,7 @@ impl<'a> Job<'a> {
         let (width, height) = (points.width(), points.height());
         let [length, radii_length] = [width, width.div_ceil(step)].map(row_length);
         let sink = Sink::new(normals, indices, width, listed)?;
-        let Scratch { depths, radii, chunks } = &*paper;
+        let Scratch { depths, ranges, radii, chunks } = &*paper;
         let row = |y: usize| {
             let row = y / step;
             let at = chunks[row / chunks[0].own.len()].place(row) * radii_length;
@@ -362,7 +373,9 @@ impl<'a> Job<'a> {
         };
         let grid = Grid::new(width, height, largest, column(options.method));
         for scratch in &each[..workers.count()] {
-            let WorkerScratch { moments, gradients, depth_changes, .. } = &mut lock(scratch).paper;
+            let WorkerScratch { moments, gradients, depth_changes, waiting, .. } =
+                &mut lock(scratch).paper;
+            waiting.reserve(grid.columns.div_ceil(step), grid.rows.div_ceil(step))?;
             match options.method {
                 Method::CovarianceMatrix => grid.reserve(moments)?,
                 Method::AverageDepthChange => grid.reserve(depth_changes)?,
@@ -371,10 +384,27 @@ impl<'a> Job<'a> {
         }
         workers.for_each(grid.count(), |worker, item| {
             let Some((columns, rows)) = grid.tile(item) else { return };
+            let ranges = &ranges[reached(&rows, largest, height)];
+            let depths = ranges.iter().fold([f32::INFINITY, 0.0], |[nearest, deepest], row| {
+                [row[0].min(nearest), row[1].max(deepest)]
+            });
             let tile = Tile { points, options, columns, rows, whole_points, largest, step, row };
             let scratch = &mut lock(&each[worker]).paper;
-            // SAFETY: the processor has the instruction set, and tiles do not share pixels.
-            unsafe { paths::run(self.isa, TileTask { tile: &tile, scratch, sink: &sink }) };
+            let span = span(options.method);
+            let mut next = Some(Layer::first(depths, span, largest));
+            while let Some(layer) = next {
+                let layer = layer.hidden_at(tile.origin(&layer));
+                let task = TileTask { tile: &tile, layer: &layer, scratch, sink: &sink };
+                // SAFETY: the processor has the instruction set, and tiles do not share pixels.
+                let nearest = unsafe {
+                    if layer.is_partial() {
+                        paths::run(self.isa, PartialTask(task))
+                    } else {
+                        paths::run(self.isa, task)
+                    }
+                };
+                next = nearest.map(|nearest| Layer::next([nearest, depths[1]], span));
+            }
         });
         Ok(())
     }
@@ -389,6 +419,16 @@ fn column(method: Method) -> usize {
     }
 }
 
+/// How many times as deep as the nearest points others may be for a method's sums to be fine enough for both: found by
+/// trying, as more layers take more time.
+fn span(method: Method) -> f32 {
+    match method {
+        Method::CovarianceMatrix => 16.0,
+        Method::Average3DGradient | Method::Simple3DGradient => 256.0,
+        Method::AverageDepthChange => 4096.0,
+    }
+}
+
 /// One row of depths.
 struct DepthsTask<'a> {
     points: &'a Points<'a>,
@@ -399,13 +439,13 @@ struct DepthsTask<'a> {
 }
 
 impl Task for DepthsTask<'_> {
-    type Output = ();
+    type Output = [f32; 2];
 
     #[inline(always)]
-    unsafe fn run<S: Groups>(self) {
+    unsafe fn run<S: Groups>(self) -> [f32; 2] {
         let DepthsTask { points, options, y, whole_points, depths } = self;
         // SAFETY: as the caller's.
-        unsafe { depths::read::<S::Widest>(points, options, y, whole_points, depths) };
+        unsafe { depths::read::<S::Widest>(points, options, y, whole_points, depths) }
     }
 }
 
@@ -426,33 +466,59 @@ impl Task for SweepTask<'_> {
     }
 }
 
-/// One tile; no one else writes its pixels.
+/// A layer of one tile; no one else writes its pixels. Gives how deep the nearest point is that pixels wait for.
 struct TileTask<'a, 't, F> {
     tile: &'t Tile<'a, F>,
+    layer: &'t Layer,
     scratch: &'t mut WorkerScratch,
     sink: &'t Sink<'t>,
 }
 
 impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Task for TileTask<'a, '_, F> {
-    type Output = ();
+    type Output = Option<f32>;
 
     #[inline(always)]
-    unsafe fn run<S: Groups>(self) {
-        let TileTask { tile, scratch, sink } = self;
+    unsafe fn run<S: Groups>(self) -> Option<f32> {
+        // SAFETY: as the caller's.
+        unsafe { self.compute::<S, false>() }
+    }
+}
+
+/// One of several layers of a tile.
+struct PartialTask<'a, 't, F>(TileTask<'a, 't, F>);
+
+impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Task for PartialTask<'a, '_, F> {
+    type Output = Option<f32>;
+
+    #[inline(always)]
+    unsafe fn run<S: Groups>(self) -> Option<f32> {
+        // SAFETY: as the caller's.
+        unsafe { self.0.compute::<S, true>() }
+    }
+}
+
+impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> TileTask<'a, '_, F> {
+    /// # Safety
+    /// As [`Task::run`].
+    #[inline(always)]
+    unsafe fn compute<S: Groups, const PARTIAL: bool>(self) -> Option<f32> {
+        let TileTask { tile, layer, scratch, sink } = self;
+        let WorkerScratch { moments, gradients, depth_changes, waiting, .. } = scratch;
         // SAFETY: as the caller's.
         unsafe {
             match tile.options.method {
                 Method::CovarianceMatrix => {
-                    let method = CovarianceMatrix::about(tile.origin());
-                    tile.compute::<S, _, MOMENTS>(&method, &mut scratch.moments, sink);
+                    let [x, y, z, _] = layer.hidden;
+                    let method = CovarianceMatrix::about([x, y, z]);
+                    tile.compute::<S, _, MOMENTS, PARTIAL>(&method, moments, layer, waiting, sink)
                 }
                 Method::AverageDepthChange => {
-                    let integrals = &mut scratch.depth_changes;
-                    tile.compute::<S, _, 4>(&SmoothedDepthChanges, integrals, sink);
+                    let method = SmoothedDepthChanges;
+                    tile.compute::<S, _, 4, PARTIAL>(&method, depth_changes, layer, waiting, sink)
                 }
                 // The paper has no SIMPLE_3D_GRADIENT: second passes on PCL's semantics take this instead.
                 Method::Average3DGradient | Method::Simple3DGradient => {
-                    tile.compute::<S, _, 8>(&Gradients, &mut scratch.gradients, sink);
+                    tile.compute::<S, _, 8, PARTIAL>(&Gradients, gradients, layer, waiting, sink)
                 }
             }
         }

@@ -137,9 +137,14 @@ impl Rects {
         }
     }
 
-    /// Where an end of a window's middle row (`line` 0) or column is missing: the differences in x and y between the
-    /// outermost points that are there, and how far apart these are; zeros if there are not two.
-    pub fn outermost(&self, line: usize, lane: usize, points: &[Counted]) -> [f32; 3] {
+    /// Of a window's middle row (`line` 0) or column the outermost points that are there, and how far apart these are; none
+    /// if there are not two.
+    pub fn outermost(
+        &self,
+        line: usize,
+        lane: usize,
+        points: &[Counted],
+    ) -> Option<([Counted; 2], f32)> {
         let (step, count) = ([1, self.stride][line], self.spans[line][lane] as usize + 1);
         let length = self.stride * self.rows;
         let ends = self.ends[line];
@@ -152,11 +157,7 @@ impl Rects {
         while points[b][3] == 0.0 && first < last {
             (b, last) = (if b < step { b + length } else { b } - step, last - 1);
         }
-        if first >= last {
-            return [0.0; 3];
-        }
-        let (a, b) = (&points[a], &points[b]);
-        [b[0] - a[0], b[1] - a[1], (last - first) as f32]
+        (first < last).then(|| ([points[a], points[b]], (last - first) as f32))
     }
 }
 

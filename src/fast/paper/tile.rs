@@ -3,10 +3,12 @@
 
 use std::ops::Range;
 
-use super::integrals::{Rings, reached, rows_of_rings};
+use super::integrals::{Counted, Rings, reached, rows_of_rings};
+use super::layers::{Layer, Waiting, with_fraction};
 use super::methods::{Sums, gather};
 use super::rects::{Place, Rects};
 use crate::cloud::Points;
+use crate::fast::arithmetic::{Doubles, Floats};
 use crate::fast::lanes::LANES;
 use crate::fast::run::{Noted, OfRun, RUN};
 use crate::fast::sink::Sink;
@@ -34,21 +36,33 @@ pub(crate) struct Tile<'a, F> {
 }
 
 impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
+    /// The normals of the pixels whose windows a layer holds, of those that wait for it. Returns how deep the nearest point
+    /// is that others wait for, if there are some.
+    ///
+    /// `PARTIAL` tells whether it is one of several: apart, as it would cost other tiles some percents.
+    ///
     /// # Safety
     /// The processor has the instruction set of `S`; no one else writes the tile's pixels.
     #[inline(always)]
-    pub unsafe fn compute<S: Groups, M: Sums<N>, const N: usize>(
+    pub unsafe fn compute<S: Groups, M: Sums<N>, const N: usize, const PARTIAL: bool>(
         &self,
         method: &M,
         rings: &mut Rings<N>,
+        layer: &Layer,
+        waiting: &mut Waiting,
         sink: &Sink,
-    ) {
+    ) -> Option<f32> {
         let (width, height) = (self.points.width(), self.points.height());
         let reach = self.largest;
         let columns = reached(&self.columns, reach, width);
         let Range { start: top, end: bottom } = reached(&self.rows, reach, height);
         let count = columns.len() * (bottom - top);
-        rings.start(columns, top, rows_of_rings(reach, height));
+        rings.start(columns, top, rows_of_rings(reach, height), layer);
+        if layer.is_first && layer.hides_some() {
+            let [columns, rows] =
+                [&self.columns, &self.rows].map(|all| all.len().div_ceil(self.step));
+            waiting.start(columns, rows);
+        }
         let mut run = Run::default();
         // SAFETY: as the caller's.
         unsafe { rings.read::<S>(self.points, (self.row)(top).0, top, self.whole_points) };
@@ -67,15 +81,16 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
             }
             let error = M::error(rings.total(next - 1), count, rings.largest);
             // SAFETY: as the caller's.
-            unsafe { self.row::<S, M, N>(rings, sink, &mut run, y, error) };
+            unsafe { self.row::<S, M, N, PARTIAL>(rings, waiting, sink, &mut run, y, error) };
         }
+        (layer.hides_some() && waiting.is_any()).then_some(rings.nearest_hidden)
     }
 
-    /// A point of the tile: sums about it lose less.
-    pub fn origin(&self) -> [f32; 3] {
+    /// A point of a layer: sums about it lose less.
+    pub fn origin(&self, layer: &Layer) -> [f32; 3] {
         for y in self.rows.clone() {
             let depths = &(self.row)(y).0[self.columns.clone()];
-            if let Some(at) = depths.iter().position(|depth| !depth.is_nan()) {
+            if let Some(at) = depths.iter().position(|depth| depth.abs() < layer.end) {
                 return self.points.at(self.columns.start + at, y);
             }
         }
@@ -85,9 +100,10 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn row<S: Groups, M: Sums<N>, const N: usize>(
+    unsafe fn row<S: Groups, M: Sums<N>, const N: usize, const PARTIAL: bool>(
         &self,
         rings: &Rings<N>,
+        waiting: &mut Waiting,
         sink: &Sink,
         run: &mut Run<M::OfRun>,
         y: usize,
@@ -96,6 +112,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let image = [self.points.width(), self.points.height()];
         let (left, stride, rows) = (rings.left(), rings.stride(), rings.rows);
         let (points, sums) = rings.parts();
+        let layer = rings.layer;
         let radii = (self.row)(y).1;
         let step = self.step;
         let middle_row = middle(y, step, image[1]);
@@ -106,6 +123,11 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         for start in self.columns.clone().step_by(RUN * step) {
             run.start = start;
             run.lanes = [0; RUN / LANES];
+            let own = [(start - self.columns.start) / step, (y - self.rows.start) / step];
+            let all = [u32::MAX; RUN / LANES];
+            let waits = PARTIAL && !layer.is_first;
+            let asked = if waits { *waiting.run(own[0], own[1]) } else { all };
+            let mut hidden = [0; RUN / LANES];
             let end = self.columns.end.min(start + RUN * step);
             for (group, x) in (start..end).step_by(GROUP * step).enumerate() {
                 let at = group * GROUP;
@@ -115,22 +137,35 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 // SAFETY: as the caller's; the rings hold what the windows of the tile's pixels need.
                 unsafe {
                     let eight = S::load(radii[x / step..].as_ptr());
-                    let windows = S::bits(S::lt(S::splat(0.0), eight)) & ((1 << count) - 1);
+                    let (pair, shift) = (at / LANES, at % LANES);
+                    let windows = S::bits(S::lt(S::splat(0.0), eight))
+                        & (asked[pair] >> shift)
+                        & ((1 << count) - 1);
                     if windows == 0 {
                         continue;
                     }
-                    run.lanes[at / LANES] |= windows << (at % LANES);
+                    run.lanes[pair] |= windows << shift;
                     // Behind the last column radii mean nothing.
                     let eight = S::and(S::mask(windows), eight);
                     let rects = Rects::new::<S, N>(&place, eight, M::INNER, M::ENDS);
                     let sums = rects.sums::<S, N>(sums);
+                    if PARTIAL && layer.hides_some() {
+                        let [.., weights] = gather::<S>(rings.points_from(x, y), &steps);
+                        let lanes = with_hidden::<S, M, N>(&sums, &rects, points, windows)
+                            | weights.lt(Floats::splat(1.0));
+                        hidden[pair] |= (windows & lanes) << shift;
+                        run.lanes[pair] &= !(lanes << shift);
+                    }
                     M::note::<S>(&sums, &rects, points, windows, &mut run.sums, at);
                     let [px, py, pz, _] = gather::<S>(rings.points_from(x, y), &steps);
                     run.points.store::<S>(at, [px, py, pz]);
                 }
             }
+            if PARTIAL {
+                *waiting.run(own[0], own[1]) = hidden;
+            }
             // SAFETY: as the caller's.
-            unsafe { self.finish::<S, M, N>(sink, run, y, error) };
+            unsafe { self.finish::<S, M, N, PARTIAL>(&layer, sink, run, y, error) };
         }
     }
 
@@ -139,8 +174,9 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn finish<S: Groups, M: Sums<N>, const N: usize>(
+    unsafe fn finish<S: Groups, M: Sums<N>, const N: usize, const PARTIAL: bool>(
         &self,
+        layer: &Layer,
         sink: &Sink,
         run: &mut Run<M::OfRun>,
         y: usize,
@@ -160,7 +196,9 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 let (at, windows) = (pair * LANES, lanes[pair]);
                 let count = (end - x).div_ceil(step).min(LANES);
                 if windows == 0 {
-                    sink.write_none::<S::Pair>(x / step, y / step, count);
+                    if !PARTIAL || layer.is_first {
+                        sink.write_none::<S::Pair>(x / step, y / step, count);
+                    }
                     continue;
                 }
                 let pixel =
@@ -182,7 +220,8 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 for lane in Bits(plain) {
                     normals.put(lane, self.plain(&cleaned, pixel(lane), &rect(lane)));
                 }
-                sink.write::<S::Pair>(x / step, y / step, all(count), &normals);
+                let written = if PARTIAL && !layer.is_first { windows } else { all(count) };
+                sink.write::<S::Pair>(x / step, y / step, written, &normals);
             }
         }
     }
@@ -194,6 +233,31 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let normal = turn_to_viewpoint(found.normal, points.at(x, y), self.options.viewpoint);
         Estimate { normal, ..found }
     }
+}
+
+/// The lanes of eight windows, of some, that hold hidden points.
+///
+/// # Safety
+/// As [`Sums::note`].
+#[inline(always)]
+unsafe fn with_hidden<S: Groups, M: Sums<N>, const N: usize>(
+    sums: &[Doubles<S>; N],
+    rects: &Rects,
+    points: &[Counted],
+    lanes: u32,
+) -> u32 {
+    let [a, b] = M::weights(sums);
+    // SAFETY: as the caller's.
+    let mut hidden = unsafe { with_fraction(a) | with_fraction(b) };
+    // A missing point beside one at the end of a middle row or column leaves no difference with it.
+    if M::ENDS {
+        let is_hidden = |lane: &usize| {
+            let ends = [0, 1].map(|line| rects.outermost(line, *lane, points));
+            ends.iter().flatten().any(|(ends, _)| ends.iter().any(|end| end[3] < 1.0))
+        };
+        hidden |= Bits(lanes & !hidden).filter(is_hidden).fold(0, |all, lane| all | 1 << lane);
+    }
+    hidden
 }
 
 /// Pixels of a row whose normals are found step by step, each step for all of them.
