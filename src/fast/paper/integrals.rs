@@ -134,8 +134,9 @@ impl<const N: usize> Rings<N> {
         unsafe {
             let mut largest = S::splat(self.largest);
             for x in (0..length).step_by(GROUP) {
-                let there = S::abs(S::load(depths.as_ptr().add(self.columns.start + x)));
-                let there = S::lt(there, S::splat(self.layer.end));
+                let depths = S::load(depths.as_ptr().add(self.columns.start + x));
+                let deeper = S::lt(S::splat(self.layer.deepest), S::abs(depths));
+                let there = S::and_not(deeper, S::eq(depths, depths));
                 let point = points.lanes::<S>(x);
                 let mut fields = [[0.0; GROUP]; 4];
                 for c in 0..3 {
@@ -164,7 +165,7 @@ impl<const N: usize> Rings<N> {
         let row = self.row(y);
         let depths = &depths[self.columns.clone()];
         for (to, depth) in self.points[row][1..].iter_mut().zip(depths) {
-            if depth.abs() >= self.layer.end {
+            if depth.abs() > self.layer.deepest {
                 *to = self.layer.hidden;
                 self.nearest_hidden = self.nearest_hidden.min(depth.abs());
             }

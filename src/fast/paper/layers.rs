@@ -26,8 +26,8 @@ const LARGEST: usize = 63;
 /// The points of a tile up to a depth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Layer {
-    /// Depths of its points are of lesser magnitudes; of those that are hidden, none is.
-    pub end: f32,
+    /// The largest magnitude of depth of a point that is not hidden.
+    pub deepest: f32,
     /// What stands for a hidden point.
     pub hidden: Counted,
     pub is_first: bool,
@@ -42,7 +42,7 @@ impl Default for Layer {
 impl Layer {
     /// All points.
     pub const ALL: Layer =
-        Layer { end: f32::INFINITY, hidden: [0.0, 0.0, 0.0, HIDDEN], is_first: true };
+        Layer { deepest: f32::INFINITY, hidden: [0.0, 0.0, 0.0, HIDDEN], is_first: true };
 
     /// The first layer of a tile with windows of up to this radius: of the points, the nearest of which is so deep, up to
     /// those `span` times as deep; none is deeper than `deepest`.
@@ -54,11 +54,8 @@ impl Layer {
     /// As [`Layer::first`], of points that were hidden before.
     pub fn next([nearest, deepest]: [f32; 2], span: f32) -> Layer {
         let end = span * nearest.max(NEAREST * deepest);
-        Layer {
-            end: if end < deepest { end } else { f32::INFINITY },
-            is_first: false,
-            ..Layer::ALL
-        }
+        let deepest = if end < deepest { end } else { f32::INFINITY };
+        Layer { deepest, is_first: false, ..Layer::ALL }
     }
 
     /// The layer, with hidden points at a place where the method's sums take them for nothing.
@@ -69,7 +66,7 @@ impl Layer {
     /// Whether it may hide points.
     #[inline(always)]
     pub fn hides_some(&self) -> bool {
-        self.end < f32::INFINITY
+        self.deepest < f32::INFINITY
     }
 
     /// Whether it is one of several.

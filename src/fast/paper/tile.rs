@@ -90,7 +90,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
     pub fn origin(&self, layer: &Layer) -> [f32; 3] {
         for y in self.rows.clone() {
             let depths = &(self.row)(y).0[self.columns.clone()];
-            if let Some(at) = depths.iter().position(|depth| depth.abs() < layer.end) {
+            if let Some(at) = depths.iter().position(|depth| depth.abs() <= layer.deepest) {
                 return self.points.at(self.columns.start + at, y);
             }
         }
