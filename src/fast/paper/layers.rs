@@ -41,7 +41,7 @@ impl Default for Layer {
 
 impl Layer {
     /// All points.
-    pub const ALL: Layer =
+    pub(crate) const ALL: Layer =
         Layer { deepest: f32::INFINITY, hidden: [0.0, 0.0, 0.0, HIDDEN], is_first: true };
 
     /// The first layer of a tile with windows of up to this radius: of the points, the nearest of which is so deep, up to
