@@ -105,7 +105,7 @@ impl EvenTile<'_> {
         let columns = reached(&self.columns, reach, width);
         let Range { start: top, end: bottom } = reached(&self.rows, reach, height);
         let moments = CovarianceMatrix::about([columns.start as f32, top as f32, self.origin()]);
-        rings.start(columns, top, rows_of_rings(reach, height), &Layer::ALL);
+        rings.start(columns, top, rows_of_rings(reach, height), &Layer::default());
         let mut next = top;
         for y in self.rows.clone().step_by(BLOCK) {
             let row = middle(y, BLOCK, height);

@@ -166,7 +166,7 @@ impl<const N: usize> Rings<N> {
         let depths = &depths[self.columns.clone()];
         for (to, depth) in self.points[row][1..].iter_mut().zip(depths) {
             if depth.abs() > self.layer.deepest {
-                *to = self.layer.hidden;
+                *to = self.layer.hidden();
                 self.nearest_hidden = self.nearest_hidden.min(depth.abs());
             }
         }

@@ -28,39 +28,37 @@ const LARGEST: usize = 63;
 pub(crate) struct Layer {
     /// The largest magnitude of depth of a point that is not hidden.
     pub deepest: f32,
-    /// What stands for a hidden point.
-    pub hidden: Counted,
+    /// Where sums are about, and where hidden points stand, which leaves nothing of them.
+    pub origin: [f32; 3],
     pub is_first: bool,
 }
 
+/// All points.
 impl Default for Layer {
     fn default() -> Self {
-        Layer::ALL
+        Layer { deepest: f32::INFINITY, origin: [0.0; 3], is_first: true }
     }
 }
 
 impl Layer {
-    /// All points.
-    pub(crate) const ALL: Layer =
-        Layer { deepest: f32::INFINITY, hidden: [0.0, 0.0, 0.0, HIDDEN], is_first: true };
-
     /// The first layer of a tile with windows of up to this radius: of the points, the nearest of which is so deep, up to
     /// those `span` times as deep; none is deeper than `deepest`.
-    pub fn first([nearest, deepest]: [f32; 2], span: f32, radius: usize) -> Layer {
-        let first = Layer { is_first: true, ..Layer::next([nearest, deepest], span) };
-        if radius > LARGEST { Layer::ALL } else { first }
+    pub fn first(depths: [f32; 2], span: f32, radius: usize) -> Layer {
+        let first = Layer { is_first: true, ..Layer::next(depths, span) };
+        if radius > LARGEST { Layer::default() } else { first }
     }
 
     /// As [`Layer::first`], of points that were hidden before.
     pub fn next([nearest, deepest]: [f32; 2], span: f32) -> Layer {
         let end = span * nearest.max(NEAREST * deepest);
         let deepest = if end < deepest { end } else { f32::INFINITY };
-        Layer { deepest, is_first: false, ..Layer::ALL }
+        Layer { deepest, is_first: false, ..Layer::default() }
     }
 
-    /// The layer, with hidden points at a place where the method's sums take them for nothing.
-    pub fn hidden_at(self, [x, y, z]: [f32; 3]) -> Layer {
-        Layer { hidden: [x, y, z, HIDDEN], ..self }
+    /// What stands for a hidden point.
+    pub fn hidden(&self) -> Counted {
+        let [x, y, z] = self.origin;
+        [x, y, z, HIDDEN]
     }
 
     /// Whether it may hide points.

@@ -392,15 +392,15 @@ impl<'a> Job<'a> {
             let scratch = &mut lock(&each[worker]).paper;
             let span = span(options.method);
             let mut next = Some(Layer::first(depths, span, largest));
-            while let Some(layer) = next {
-                let layer = layer.hidden_at(tile.origin(&layer));
-                let task = TileTask { tile: &tile, layer: &layer, scratch, sink: &sink };
+            while let Some(mut layer) = next {
+                layer.origin = tile.origin(&layer);
+                let (tile, layer, sink) = (&tile, &layer, &sink);
                 // SAFETY: the processor has the instruction set, and tiles do not share pixels.
                 let nearest = unsafe {
                     if layer.is_partial() {
-                        paths::run(self.isa, PartialTask(task))
+                        paths::run(self.isa, TileTask::<_, true> { tile, layer, scratch, sink })
                     } else {
-                        paths::run(self.isa, task)
+                        paths::run(self.isa, TileTask::<_, false> { tile, layer, scratch, sink })
                     }
                 };
                 next = nearest.map(|nearest| Layer::next([nearest, depths[1]], span));
@@ -466,50 +466,30 @@ impl Task for SweepTask<'_> {
     }
 }
 
-/// A layer of one tile; no one else writes its pixels. Gives how deep the nearest point is that pixels wait for.
-struct TileTask<'a, 't, F> {
+/// A layer of one tile; no one else writes its pixels. Gives how deep the nearest point is that pixels wait for. `PARTIAL`
+/// tells whether the layer is one of several: apart, as it would cost other tiles some percents.
+struct TileTask<'a, 't, F, const PARTIAL: bool> {
     tile: &'t Tile<'a, F>,
     layer: &'t Layer,
     scratch: &'t mut WorkerScratch,
     sink: &'t Sink<'t>,
 }
 
-impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Task for TileTask<'a, '_, F> {
+impl<'a, F, const PARTIAL: bool> Task for TileTask<'a, '_, F, PARTIAL>
+where
+    F: Fn(usize) -> (&'a [f32], &'a [f32]),
+{
     type Output = Option<f32>;
 
     #[inline(always)]
     unsafe fn run<S: Groups>(self) -> Option<f32> {
-        // SAFETY: as the caller's.
-        unsafe { self.compute::<S, false>() }
-    }
-}
-
-/// One of several layers of a tile.
-struct PartialTask<'a, 't, F>(TileTask<'a, 't, F>);
-
-impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Task for PartialTask<'a, '_, F> {
-    type Output = Option<f32>;
-
-    #[inline(always)]
-    unsafe fn run<S: Groups>(self) -> Option<f32> {
-        // SAFETY: as the caller's.
-        unsafe { self.0.compute::<S, true>() }
-    }
-}
-
-impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> TileTask<'a, '_, F> {
-    /// # Safety
-    /// As [`Task::run`].
-    #[inline(always)]
-    unsafe fn compute<S: Groups, const PARTIAL: bool>(self) -> Option<f32> {
         let TileTask { tile, layer, scratch, sink } = self;
         let WorkerScratch { moments, gradients, depth_changes, waiting, .. } = scratch;
         // SAFETY: as the caller's.
         unsafe {
             match tile.options.method {
                 Method::CovarianceMatrix => {
-                    let [x, y, z, _] = layer.hidden;
-                    let method = CovarianceMatrix::about([x, y, z]);
+                    let method = CovarianceMatrix::about(layer.origin);
                     tile.compute::<S, _, MOMENTS, PARTIAL>(&method, moments, layer, waiting, sink)
                 }
                 Method::AverageDepthChange => {

@@ -39,7 +39,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
     /// The normals of the pixels whose windows a layer holds, of those that wait for it. Returns how deep the nearest point
     /// is that others wait for, if there are some.
     ///
-    /// `PARTIAL` tells whether it is one of several: apart, as it would cost other tiles some percents.
+    /// `PARTIAL` tells whether it is one of several.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`; no one else writes the tile's pixels.
@@ -125,8 +125,8 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
             run.lanes = [0; RUN / LANES];
             let own = [(start - self.columns.start) / step, (y - self.rows.start) / step];
             let all = [u32::MAX; RUN / LANES];
-            let waits = PARTIAL && !layer.is_first;
-            let asked = if waits { *waiting.run(own[0], own[1]) } else { all };
+            let is_later = PARTIAL && !layer.is_first;
+            let asked = if is_later { *waiting.run(own[0], own[1]) } else { all };
             let mut hidden = [0; RUN / LANES];
             let end = self.columns.end.min(start + RUN * step);
             for (group, x) in (start..end).step_by(GROUP * step).enumerate() {
@@ -165,22 +165,22 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 *waiting.run(own[0], own[1]) = hidden;
             }
             // SAFETY: as the caller's.
-            unsafe { self.finish::<S, M, N, PARTIAL>(&layer, sink, run, y, error) };
+            unsafe { self.finish::<S, M, N>(sink, run, y, error, is_later) };
         }
     }
 
-    /// Writes the normals of a run in row `y`.
+    /// Writes the normals of a run in row `y`; in a later layer, only those of the pixels that waited for it.
     ///
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn finish<S: Groups, M: Sums<N>, const N: usize, const PARTIAL: bool>(
+    unsafe fn finish<S: Groups, M: Sums<N>, const N: usize>(
         &self,
-        layer: &Layer,
         sink: &Sink,
         run: &mut Run<M::OfRun>,
         y: usize,
         error: f64,
+        is_later: bool,
     ) {
         let step = self.step;
         let radii = (self.row)(y).1;
@@ -196,7 +196,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 let (at, windows) = (pair * LANES, lanes[pair]);
                 let count = (end - x).div_ceil(step).min(LANES);
                 if windows == 0 {
-                    if !PARTIAL || layer.is_first {
+                    if !is_later {
                         sink.write_none::<S::Pair>(x / step, y / step, count);
                     }
                     continue;
@@ -220,7 +220,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 for lane in Bits(plain) {
                     normals.put(lane, self.plain(&cleaned, pixel(lane), &rect(lane)));
                 }
-                let written = if PARTIAL && !layer.is_first { windows } else { all(count) };
+                let written = if is_later { windows } else { all(count) };
                 sink.write::<S::Pair>(x / step, y / step, written, &normals);
             }
         }
