@@ -23,6 +23,9 @@ pub(crate) const REACH: f32 = 4.0;
 /// costs `CREASE_COST` times as much.
 pub(crate) const CREASE_NOISE: f32 = 16.0;
 pub(crate) const CREASE_COST: f32 = 10.0;
+/// Windows whose costs differ by a smaller share than this one lacks are worth the same: which is the better one, on
+/// surfaces that are alike to both sides, is rounding. The first one is taken.
+pub(crate) const ALIKE: f32 = 0.999;
 /// Depths are exact if more than this share of the windows that a pixel can take says so.
 pub(crate) const EXACT_SHARE: f32 = 0.25;
 
@@ -110,19 +113,19 @@ impl EvenWindows<'_> {
             (short == 0.0 || lies_in()).then_some(Candidate { place, plane, middle, cost })
         };
         let candidates: Vec<Candidate> = found.into_iter().filter_map(candidate).collect();
-        let mut best: Option<&Candidate> = None;
+        let (mut best, mut least) = (None, f32::INFINITY);
         for candidate in &candidates {
-            if candidate.cost < best.map_or(f32::INFINITY, |best| best.cost) {
-                best = Some(candidate);
+            if candidate.cost < least {
+                (best, least) = (Some(candidate), ALIKE * candidate.cost);
             }
         }
         // By chance the pixel may be nearer to the plane beyond a crease.
         let mut chosen = best?;
-        let mut least = CREASE_COST * chosen.cost;
+        least *= CREASE_COST;
         for candidate in &candidates {
             if candidate.cost < least && candidate.is_this_side([x, y], best?, CREASE_NOISE * noise)
             {
-                (chosen, least) = (candidate, candidate.cost);
+                (chosen, least) = (candidate, ALIKE * candidate.cost);
             }
         }
         Some(chosen.place as u32)

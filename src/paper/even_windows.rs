@@ -126,7 +126,8 @@ pub(crate) fn even_windows<'a>(
     needed.iter().enumerate().map(window)
 }
 
-fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<EvenWindow> {
+/// That of one block: the plain form.
+pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<EvenWindow> {
     let pixel = asked.blocks.middle(block);
     let (wanted, clean) = (asked.wanted[block], asked.clean[cloud.index(pixel.0, pixel.1)]);
     let rect = |radius: u32| Rect::around(pixel, radius as usize, (cloud.width, cloud.height));

@@ -21,11 +21,12 @@ mod surroundings;
 
 pub(crate) use blocks::{BLOCK, Blocks, MIDDLE, middle};
 pub(crate) use choices::{
-    CREASE_COST, CREASE_NOISE, EXACT_SHARE, EvenWindows, MISFIT, NEAR, NEAR_NOISE, REACH,
+    ALIKE, CREASE_COST, CREASE_NOISE, EXACT_SHARE, EvenWindows, MISFIT, NEAR, NEAR_NOISE, REACH,
 };
 pub(crate) use cloud::{CleanPoints, Cleaned, Cloud};
 pub(crate) use even_windows::{
-    Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, PLACES, even_windows,
+    Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, PLACES, even_window,
+    even_windows,
 };
 pub(crate) use methods::estimate as plain_estimate;
 pub(crate) use planes::{JITTER, Plane, inverse_depth};

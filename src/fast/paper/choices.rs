@@ -13,8 +13,8 @@ use crate::fast::windows::threshold;
 use crate::memory::{make_room, refill};
 use crate::options::{Options, Semantics};
 use crate::paper::{
-    BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows, JITTER,
-    MIDDLE, MISFIT, NEAR, NEAR_NOISE, PLACES, REACH, inverse_depth,
+    ALIKE, BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows,
+    JITTER, MIDDLE, MISFIT, NEAR, NEAR_NOISE, PLACES, REACH, inverse_depth,
 };
 use crate::simd::{Along, Groups, Simd};
 
@@ -349,6 +349,7 @@ impl Group<'_> {
             let near_noise = Floats::splat(NEAR_NOISE) * found.noise / near.points;
             let at_near = [column + near.offset[0], row + near.offset[1]];
             let crease_noise = Floats::splat(CREASE_NOISE) * found.noise;
+            let alike = Floats::splat(ALIKE);
             let mut least = Floats::<S>::splat(f32::INFINITY);
             let mut best = S::splat(-1.0);
             let mut planes = Inclined { at_middle: zero, slope: [zero; 2] };
@@ -367,7 +368,7 @@ impl Group<'_> {
                 let is_beyond = S::and_not(lies_in, S::lt(zero.0, short.0));
                 candidates.cost.0 = S::select(is_beyond, S::splat(f32::INFINITY), cost.0);
                 let better = S::lt(candidates.cost.0, least.0);
-                least.0 = S::select(better, cost.0, least.0);
+                least.0 = S::select(better, (alike * cost).0, least.0);
                 best = S::select(better, S::splat(number as f32), best);
                 planes.replace(better, &candidates.planes);
                 middle[0].0 = S::select(better, dx.0, middle[0].0);
@@ -384,7 +385,7 @@ impl Group<'_> {
                 let is_crease = S::and(are_two, S::lt((here * there).0, zero.0));
                 let is_this_side = S::lt(zero.0, (here * gap.at([column, row])).0);
                 let better = S::and(is_better, S::and(is_crease, is_this_side));
-                least.0 = S::select(better, candidates.cost.0, least.0);
+                least.0 = S::select(better, (alike * candidates.cost).0, least.0);
                 best = S::select(better, S::splat(number as f32), best);
             }
             let mut numbers = [0; LANES];

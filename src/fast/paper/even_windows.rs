@@ -4,16 +4,29 @@
 use std::ops::Range;
 
 use super::integrals::{Rings, reached, rows_of_rings};
-use super::layers::Layer;
+use super::layers::{Layer, with_fraction};
 use super::methods::{CovarianceMatrix, MOMENTS};
 use super::rects::{Place, Rects, STEPS, range};
 use crate::fast::Parts;
 use crate::fast::arithmetic::{Doubles, Floats};
+use crate::fast::tile::Bits;
 use crate::paper::{
     Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, MIDDLE, Plane,
-    inverse_depth, middle,
+    ROUNDING, even_window, inverse_depth, middle,
 };
 use crate::simd::{GROUP, Groups};
+
+/// A window is doubtful if rounding could change its variance, or the least that is told from none, by more than this
+/// share.
+const DOUBT: f64 = 0.25;
+
+/// How many of a tile's points tell what inverse depths are usual, and the share of them that may be farther off than
+/// others hold.
+const SAMPLES: usize = 64;
+const UNUSUAL: usize = 16;
+
+/// Points so many times as near as usual ones are hidden: windows that hold some are doubtful.
+const SPAN: f32 = 64.0;
 
 /// A rectangle of the image whose blocks' even windows are found together.
 pub(super) struct EvenTile<'a> {
@@ -104,8 +117,12 @@ impl EvenTile<'_> {
         let &Cloud { width, height, ref depths, .. } = self.cloud;
         let columns = reached(&self.columns, reach, width);
         let Range { start: top, end: bottom } = reached(&self.rows, reach, height);
-        let moments = CovarianceMatrix::about([columns.start as f32, top as f32, self.origin()]);
-        rings.start(columns, top, rows_of_rings(reach, height), &Layer::default());
+        let [usual, near] = self.usual_inverse_depths();
+        let [x, y] = [columns.start + columns.end, top + bottom].map(|ends| (ends / 2) as f32);
+        let origin = [x, y, usual];
+        let moments = CovarianceMatrix::about(origin);
+        let layer = Layer::of_positions(origin, SPAN * near, reach);
+        rings.start(columns, top, rows_of_rings(reach, height), &layer);
         let mut next = top;
         for y in self.rows.clone().step_by(BLOCK) {
             let row = middle(y, BLOCK, height);
@@ -114,27 +131,48 @@ impl EvenTile<'_> {
                 rings.push(&moments, next);
                 next += 1;
             }
+            let total = rings.total(next - 1);
             for x in self.columns.clone().step_by(GROUP * BLOCK) {
                 let block = self.asked.blocks.block(y * width + x);
                 let blocks = block..block + (self.columns.end - x).div_ceil(BLOCK).min(GROUP);
                 // SAFETY: as the caller's.
                 unsafe {
-                    let found = self.eight::<S>(rings, &moments, (x + MIDDLE, row), blocks.clone());
-                    found.write(windows.part(blocks));
+                    let pixel = (x + MIDDLE, row);
+                    let (found, doubtful) =
+                        self.eight::<S>(rings, &moments, &total, pixel, blocks.clone());
+                    let windows = windows.part(blocks.clone());
+                    found.write(windows);
+                    for lane in Bits(doubtful) {
+                        let window = even_window(self.cloud, self.asked, blocks.start + lane);
+                        windows[lane] = window.unwrap_or_default();
+                    }
                 }
             }
         }
     }
 
-    /// An inverse depth of the tile: sums about it lose less.
-    fn origin(&self) -> f32 {
-        let &Cloud { width, ref depths, .. } = self.cloud;
-        let row = |y: usize| &depths[y * width..][self.columns.clone()];
-        let inverse = self.rows.clone().flat_map(row).map(|depth| inverse_depth(*depth));
-        inverse.into_iter().find(|r| !r.is_nan()).unwrap_or(0.0)
+    /// An inverse depth in the middle of those of some of the tile's points, about which sums lose little; and the magnitude
+    /// of one that few are beyond, infinite if there is none.
+    fn usual_inverse_depths(&self) -> [f32; 2] {
+        let EvenTile { cloud, columns, rows, .. } = self;
+        let sample = |number: usize| {
+            // All over the tile: no two in a row or in a column.
+            let place = |range: &Range<usize>, at: usize| range.start + at * range.len() / SAMPLES;
+            let [x, y] = [place(columns, number * 37 % SAMPLES), place(rows, number)];
+            inverse_depth(cloud.depths[cloud.index(x, y)])
+        };
+        let mut samples: [f32; SAMPLES] = std::array::from_fn(sample);
+        samples.sort_unstable_by(|a, b| a.abs().total_cmp(&b.abs()));
+        // NaN is last.
+        let there = samples.partition_point(|sample| !sample.is_nan());
+        match there.checked_sub(1) {
+            None => [0.0, f32::INFINITY],
+            Some(last) => [samples[there / 2], samples[last - there / UNUSUAL].abs()],
+        }
     }
 
-    /// The windows of at most eight `blocks`, of which `pixel` is the first one's middle, inside the image or not.
+    /// The windows of at most eight `blocks`, of which `pixel` is the first one's middle, inside the image or not; and
+    /// the lanes in which rounding may have had a say, where points have been summed to `total`.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`; the rings hold what the windows need.
@@ -143,9 +181,10 @@ impl EvenTile<'_> {
         &self,
         rings: &Rings<MOMENTS>,
         moments: &CovarianceMatrix,
+        total: &[f64; MOMENTS],
         pixel: (usize, usize),
         blocks: Range<usize>,
-    ) -> Fits<S> {
+    ) -> (Fits<S>, u32) {
         let &Cloud { width, .. } = self.cloud;
         let clean_radii = &self.asked.clean[pixel.1 * width..][..width];
         let [mut wanted, mut clean, mut largest] = [[0.0; GROUP]; 3];
@@ -164,9 +203,10 @@ impl EvenTile<'_> {
             let smallest = Floats::splat(JAGGED_RADIUS as f32 - 1.0);
             let mut radii = wanted;
             let mut todo = clean.lt(radii) & smallest.lt(radii);
-            let mut done = 0;
+            let (mut done, mut doubtful) = (0, 0);
             while todo != 0 {
                 let (fits, there) = self.fits(rings, moments, pixel, radii, todo);
+                doubtful |= there & self.doubtful(rings, total, &fits);
                 let jagged = there & self.jagged(&fits, pixel, radii);
                 found.take(jagged, &fits);
                 done |= jagged;
@@ -181,6 +221,7 @@ impl EvenTile<'_> {
             while todo != 0 {
                 let (fits, there) = self.fits(rings, moments, pixel, radii, todo);
                 todo = there;
+                doubtful |= there & self.doubtful(rings, total, &fits);
                 if !is_first {
                     todo &= fits.noise.max(least).lt(found.unevenness);
                 }
@@ -189,7 +230,34 @@ impl EvenTile<'_> {
                 radii.0 = S::truncate((radii * Floats::splat(0.5)).0);
                 is_first = false;
             }
-            found
+            (found, doubtful)
+        }
+    }
+
+    /// The lanes whose planes are not those of all points, or that rounding may have a say in, where points have been
+    /// summed to `total`. Sums of positions are whole numbers, and exact.
+    ///
+    /// # Safety
+    /// As [`EvenTile::eight`]'s.
+    #[inline(always)]
+    unsafe fn doubtful<S: Groups>(
+        &self,
+        rings: &Rings<MOMENTS>,
+        total: &[f64; MOMENTS],
+        fits: &Fits<S>,
+    ) -> u32 {
+        let [xx, yy, rr] = [total[4], total[5], total[6]];
+        let [a, b] = fits.slope;
+        // SAFETY: as the caller's.
+        unsafe {
+            let splat = |value| Doubles::<S>::splat(value);
+            // More than (|r| + |a x| + |b y|)^2.
+            let summed = splat(3.0) * (splat(rr) + a * a * splat(xx) + b * b * splat(yy));
+            let least = splat(self.asked.least_noise.into()).max(fits.unevenness);
+            let allowed = splat(DOUBT) * least * (fits.points - splat(3.0));
+            let hides_some = rings.nearest_hidden < f32::INFINITY;
+            let hidden = if hides_some { with_fraction(fits.points) } else { 0 };
+            hidden | !(splat(ROUNDING) * summed).lt(allowed)
         }
     }
 
@@ -231,10 +299,10 @@ impl EvenTile<'_> {
             let noise = unevenness * chance.widen();
             // The pixels' own positions.
             let column = columns::<S>(x, self.cloud.width).widen();
-            let [left, top, origin, _] = moments.origin.map(|o| Doubles::splat(o));
-            let across = column - left - mx;
-            let down = Doubles::splat(y as f64) - top - my;
-            let inverse_depth = origin + mr + slope[0] * across + slope[1] * down;
+            let [origin_x, origin_y, origin_r, _] = moments.origin.map(|o| Doubles::splat(o));
+            let across = column - origin_x - mx;
+            let down = Doubles::splat(y as f64) - origin_y - my;
+            let inverse_depth = origin_r + mr + slope[0] * across + slope[1] * down;
             (
                 Fits { radii: radii.widen(), inverse_depth, slope, points: n, unevenness, noise },
                 there,

@@ -179,7 +179,14 @@ impl<const N: usize> Rings<N> {
         let (to, rest) = self.points[row][1..].split_at_mut(depths.len());
         for ((x, depth), to) in self.columns.clone().zip(depths).zip(to) {
             let inverse = inverse_depth(*depth);
-            *to = if inverse.is_nan() { [0.0; 4] } else { [x as f32, y as f32, inverse, 1.0] };
+            *to = if inverse.is_nan() {
+                [0.0; 4]
+            } else if inverse.abs() > self.layer.deepest {
+                self.nearest_hidden = self.nearest_hidden.min(inverse.abs());
+                self.layer.hidden()
+            } else {
+                [x as f32, y as f32, inverse, 1.0]
+            };
         }
         rest.fill([0.0; 4]);
     }

@@ -26,7 +26,7 @@ const LARGEST: usize = 63;
 /// The points of a tile up to a depth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Layer {
-    /// The largest magnitude of depth of a point that is not hidden.
+    /// The largest magnitude of depth, or of what stands for it, of a point that is not hidden.
     pub deepest: f32,
     /// Where sums are about, and where hidden points stand, which leaves nothing of them.
     pub origin: [f32; 3],
@@ -53,6 +53,13 @@ impl Layer {
         let end = span * nearest.max(NEAREST * deepest);
         let deepest = if end < deepest { end } else { f32::INFINITY };
         Layer { deepest, is_first: false, ..Layer::default() }
+    }
+
+    /// Of positions and inverse depths, about these: those of inverse depths up to `deepest`, where windows have radii of
+    /// up to this one.
+    pub fn of_positions(origin: [f32; 3], deepest: f32, radius: usize) -> Layer {
+        let deepest = if radius > LARGEST { f32::INFINITY } else { deepest };
+        Layer { deepest, origin, is_first: true }
     }
 
     /// What stands for a hidden point.
