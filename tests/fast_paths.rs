@@ -338,6 +338,67 @@ fn points_on_opposite_sides_equal_the_plain_form() {
     println!("{worst:?}");
 }
 
+/// No depth change map tells whether the last point of all belongs to those next to it.
+#[test]
+fn a_last_point_apart_equals_the_plain_form() {
+    let mut worst = Worst::default();
+    let changes: [fn([f32; 3]) -> [f32; 3]; 5] = [
+        |_| [f32::NAN; 3],
+        |[x, y, _]| [x, y, f32::INFINITY],
+        |[_, y, z]| [f32::NAN, y, z],
+        |point| point.map(|c| 100.0 * c),
+        |_| [0.0; 3],
+    ];
+    for (seed, change) in (0..).zip(changes) {
+        for kind in [Kind::Wavy, Kind::Plane, Kind::Steps] {
+            let mut cloud = Cloud::new(kind, 61, 47, seed);
+            let last = cloud.points.last_mut().expect("points");
+            *last = change(*last);
+            for method in methods() {
+                for smoothing in SMOOTHING {
+                    let options = options(method, smoothing, false);
+                    worst.check(
+                        &cloud,
+                        &format!("{kind:?}, last {last:?}", last = cloud.points.last()),
+                        &options,
+                    );
+                }
+            }
+        }
+    }
+    println!("{worst:?}");
+}
+
+/// Many equal depths, as of a sensor with depth steps, beside far ones: sums of integers round all of them alike.
+#[test]
+fn depth_steps_equal_the_plain_form() {
+    let mut worst = Worst::default();
+    let (width, height) = (96, 70);
+    for seed in 0..12_usize {
+        // Steps that no integers are multiples of.
+        let step = 0.003 * (1.0 + seed as f32 / 7.0);
+        let far = [8.0, 20.0, 40.0][seed % 3];
+        let point = |at: usize| {
+            let (x, y) = (at % width, at / width);
+            let [u, v] = [(x as f32 - 48.0) / 525.0, (y as f32 - 35.0) / 525.0];
+            let z = if x > 80 { far } else { 1.0 + 0.7 * u - 0.3 * v };
+            let z = step * (z / step).round();
+            [u * z, v * z, z]
+        };
+        let cloud = Cloud { width, height, points: (0..width * height).map(point).collect() };
+        for method in methods() {
+            for smoothing in SMOOTHING {
+                worst.check(
+                    &cloud,
+                    &format!("steps of {step}"),
+                    &options(method, smoothing, false),
+                );
+            }
+        }
+    }
+    println!("{worst:?}");
+}
+
 const CANARY: f32 = -12345.5;
 
 /// The cloud in an array of points of `stride` floats, rows `row` floats apart.

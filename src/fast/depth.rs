@@ -15,9 +15,8 @@ pub(crate) trait Depth: Lane + Number {
     /// As many lanes as are added along a row at once.
     type Along<S: Groups>: Simd;
 
-    /// What rounding hardly ever moves a difference between two half windows' sums by more than: where depths are
-    /// multiplied by `scale`, none is larger than `limit`, and the ring holds so many. Of integers, over the root of
-    /// the points in a half window.
+    /// What rounding moves a difference between two half windows' sums by at most: where depths are multiplied by
+    /// `scale`, none is larger than `limit`, and the ring holds so many. Of integers, between their means.
     fn error(scale: f32, limit: f32, held: usize) -> f64;
 
     /// What the square of that is divided by for means over so many points.
@@ -94,13 +93,14 @@ impl Depth for i32 {
     type Along<S: Groups> = S::Widest;
 
     fn error(scale: f32, _limit: f32, _held: usize) -> f64 {
-        // 3.7 standard deviations: the variance of a rounding is a twelfth of a step's square.
-        1.5 / f64::from(scale)
+        // Equal depths, as of a sensor with depth steps, are all rounded alike.
+        1.0 / f64::from(scale)
     }
 
     #[inline(always)]
-    fn reduction<S: Simd>(points: Floats<S>) -> Floats<S> {
-        points
+    fn reduction<S: Simd>(_points: Floats<S>) -> Floats<S> {
+        // SAFETY: there is a group, so there is the instruction set.
+        unsafe { Floats::splat(1.0) }
     }
 
     fn of_one(depth: f32) -> i32 {

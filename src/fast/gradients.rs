@@ -12,13 +12,13 @@ use crate::simd::Simd;
 pub(crate) struct Scale {
     origin: [f32; 3],
     scale: f32,
-    /// Of [`DOUBT_ROUNDING`].
+    /// What rounding to integers moves the sums over a window of side 1 by at most, over [`DOUBT`].
     doubt: f32,
 }
 
-/// Rounding to integers hardly ever moves a sum of so many coordinates by more than their root. A normal is doubtful
-/// where that could turn it by more than 1e-4, or where floats could: (sine of the angle between the tangents) < 1e-3.
-const DOUBT_ROUNDING: f32 = 1e8;
+/// A normal is doubtful where rounding to integers could turn it by more than this, or where floats could: (sine of the
+/// angle between the tangents) < 1e-3.
+const DOUBT: f32 = 1e-4;
 const DOUBT_SINE: f32 = 1e-6;
 
 impl Scale {
@@ -27,11 +27,12 @@ impl Scale {
     pub fn new(strips: usize, limit: f32, side: usize, origin: [f32; 3]) -> Self {
         // strips side limit scale < 2^31, and a power of two: one exactly as large will not do.
         let mut bits = 31.0 - (f64::from(limit) * (strips * side) as f64).log2();
-        let mut doubt = DOUBT_ROUNDING * strips as f32;
+        // Equal coordinates, as of a sensor with depth steps, are all rounded alike.
+        let mut doubt = 0.5 * strips as f32 / DOUBT;
         if origin != [0.0; 3] {
             // The way from there is rounded to a float first: for limit scale < 2^25 that at most doubles the error.
             bits = bits.min(25.0 - f64::from(limit).log2());
-            doubt *= 4.0;
+            doubt *= 2.0;
         }
         Scale { origin, scale: (bits.ceil() - 1.0).clamp(-120.0, 120.0).exp2() as f32, doubt }
     }
@@ -64,7 +65,8 @@ impl Scale {
         unsafe {
             let n = cross(v, h);
             let (n2, h2, v2) = (dot(n, n), dot(h, h), dot(v, v));
-            let rounding = Floats(sides) * Floats::splat(self.doubt) * (h2 + v2);
+            let doubt = Floats(sides) * Floats::splat(self.doubt);
+            let rounding = doubt * doubt * (h2 + v2);
             let sine = h2 * v2 * Floats::splat(DOUBT_SINE);
             let scale = Floats::splat(1.0) / n2.sqrt();
             Found {

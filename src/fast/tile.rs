@@ -12,6 +12,7 @@ use super::sink::Sink;
 use super::windows::Sides;
 use crate::Error;
 use crate::cloud::Points;
+use crate::depth_change::is_depth_change;
 use crate::methods::{Estimate, estimate};
 use crate::options::{BorderPolicy, Options};
 use crate::orientation::turn_to_viewpoint;
@@ -508,17 +509,29 @@ impl Tile<'_> {
         })
     }
 
-    /// Whether a mirrored window certainly holds finite points only.
+    /// Whether a mirrored window, and the pixels around it, certainly hold finite points without a depth change only.
     ///
     /// Distances are too large in the image's outermost rows and columns, where only one of the passes works;
-    /// there, the next pixel inwards must have as large a window.
+    /// there, the next pixel inwards must have as large a window. The last pixel of all is in no depth change map.
     pub fn has_only_finite(&self, (x, y): (usize, usize), side: usize) -> bool {
         let Image { width, height, border_policy } = *self.image;
         if border_policy != BorderPolicy::Mirror || side > width.min(height) {
             return false;
         }
         let inner = (x.clamp(1, width - 2), y.clamp(1, height - 2));
-        inner == (x, y) || self.sides.row(inner.1)[inner.0] as usize >= side
+        let reach = side / 2 + 1;
+        let reaches_last = width - 1 <= x + reach && height - 1 <= y + reach;
+        (inner == (x, y) || self.sides.row(inner.1)[inner.0] as usize >= side)
+            && !(reaches_last && self.is_last_apart())
+    }
+
+    /// Whether there is a depth change between the image's last pixel and one next to it.
+    fn is_last_apart(&self) -> bool {
+        let (x, y) = (self.image.width - 1, self.image.height - 1);
+        let last = self.points.z(x, y);
+        [(x - 1, y), (x, y - 1)].into_iter().any(|(x, y)| {
+            is_depth_change(self.points.z(x, y), last, self.options.max_depth_change_factor)
+        })
     }
 }
 
