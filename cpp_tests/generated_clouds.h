@@ -204,6 +204,10 @@ namespace generated
       cloud.at (w - 1, 20) = cloud.at (20, h - 1) = cloud.at (0, 30) = cloud.at (40, 0) = missing;
     });
 
+    add ("last point missing", [&] (Points &cloud) { cloud.points.back () = missing; });
+    add ("last point infinite", [] (Points &cloud) { cloud.points.back ().z () = Infinity; });
+    add ("last point far", [] (Points &cloud) { cloud.points.back () *= 100.0f; });
+
     scattered ("x alone missing", 10, 40, [] (Eigen::Vector3f &p) { p.x () = NaN; });
     scattered ("y alone missing", 11, 40, [] (Eigen::Vector3f &p) { p.y () = NaN; });
     scattered ("z alone missing", 12, 40, [] (Eigen::Vector3f &p) { p.z () = NaN; });

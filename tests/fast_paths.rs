@@ -396,6 +396,21 @@ fn depth_steps_equal_the_plain_form() {
             }
         }
     }
+    // Flat in front of the camera, with zeros for "no return".
+    for seed in 0..6 {
+        let step = [0.1, 0.3][seed % 2];
+        let point = |at: usize| {
+            let (x, y) = (at % width, at / width);
+            let [u, v] = [(x as f32 - 48.0) / 400.0, (y as f32 - 35.0) / 400.0];
+            let z = step * ((2.0 + (0.5 + seed as f32) * u + 0.5 * v) / step).round();
+            let is_hole = at.wrapping_mul(2654435761) >> 7 & 255 < 12;
+            if is_hole { [0.0; 3] } else { [u * z, v * z, z] }
+        };
+        let cloud = Cloud { width, height, points: (0..width * height).map(point).collect() };
+        for options in &edge_options() {
+            worst.check(&cloud, &format!("flat, seed {seed}"), options);
+        }
+    }
     println!("{worst:?}");
 }
 

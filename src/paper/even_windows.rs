@@ -20,9 +20,9 @@ const EVEN: f32 = 0.02;
 /// taken to be as far above the least one of all windows that a pixel can take.
 pub(crate) const CHANCE: f32 = 3.0;
 /// On steep surfaces the sensor's noise along the rows and columns looks like depth changes. A window with some is
-/// still on one surface if its points deviate from the plane by less than the plane changes in this many pixels:
-/// across a true change it would be side / 6 pixels, so the window must have at least `JAGGED_RADIUS` and
-/// `JAGGED_POINTS` of its points.
+/// still on one surface if its points deviate from the plane by less than the plane changes in this many pixels, and
+/// that is no less than what is told from none: across a true change it would be side / 6 pixels, so the window must have
+/// at least `JAGGED_RADIUS` and `JAGGED_POINTS` of its points.
 pub(crate) const JAGGED: f64 = 1.4;
 pub(crate) const JAGGED_RADIUS: u32 = 2;
 pub(crate) const JAGGED_POINTS: f64 = 0.8;
@@ -134,7 +134,9 @@ pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<
     let plane = |radius: u32| Plane::of(cloud, &rect(radius));
     let jagged = |radius: u32| {
         let plane = plane(radius)?;
-        let is_jagged = plane.unevenness <= JAGGED * JAGGED * plane.steepness_squared()
+        let steep = JAGGED * JAGGED * plane.steepness_squared();
+        let is_jagged = plane.unevenness <= steep
+            && f64::from(asked.least_noise) <= steep
             && plane.points >= JAGGED_POINTS * rect(radius).area() as f64;
         is_jagged.then_some((radius, plane))
     };

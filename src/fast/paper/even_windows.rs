@@ -327,9 +327,10 @@ impl EvenTile<'_> {
             let row = Floats::splat(y as f32);
             let &Cloud { width, height, .. } = self.cloud;
             let area = side(columns(x, width), radii, width) * side(row, radii, height);
-            let limit = Doubles::splat(JAGGED * JAGGED) * (a * a + b * b);
+            let steep = Doubles::splat(JAGGED * JAGGED) * (a * a + b * b);
             let fewest = Doubles::splat(JAGGED_POINTS) * area.widen();
-            !limit.lt(fits.unevenness) & !fits.points.lt(fewest)
+            let least = Doubles::splat(self.asked.least_noise.into());
+            !steep.lt(fits.unevenness) & !steep.lt(least) & !fits.points.lt(fewest)
         }
     }
 }
