@@ -124,6 +124,57 @@ impl Cloud {
         cloud
     }
 
+    /// A surface with or without a wave, a step, noise, depth steps, missing and odd points, anywhere and of any size.
+    pub fn random(random: &mut Random) -> Cloud {
+        let [width, height] = [(); 2].map(|()| match random.below(4) {
+            0 => 1 + random.below(30),
+            _ => 20 + random.below(80),
+        });
+        let or_none = |random: &mut Random, low: f32, high: f32| match random.below(2) {
+            0 => 0.0,
+            _ => random.between(low, high),
+        };
+        let focal = random.between(30.0, 600.0);
+        let depth = random.between(-1.5, 2.5).exp();
+        let slope = [(); 2].map(|()| random.between(-1.0, 1.0));
+        let [wave, step] = [or_none(random, 0.0, 0.3), or_none(random, -0.5, 0.5)];
+        let [noise, depth_step] = [(); 2].map(|()| or_none(random, -10.0, -2.0));
+        let [missing, odd] = [(); 2].map(|()| or_none(random, 0.0, 0.5).powi(3));
+        let change = random.pick(&ODD);
+        let scale = or_none(random, -7.0, 7.0).exp();
+        let offset = [(); 3].map(|()| or_none(random, -50.0, 50.0));
+        let mut points = Vec::with_capacity(width * height);
+        for at in 0..width * height {
+            let u = ((at % width) as f32 - width as f32 / 2.0) / focal;
+            let v = ((at / width) as f32 - height as f32 / 2.0) / focal;
+            let mut z =
+                1.0 + slope[0] * u + slope[1] * v + wave * (20.0 * u).sin() * (30.0 * v).cos();
+            z += if u + 2.0 * v > 0.1 { step } else { 0.0 };
+            if noise < 0.0 {
+                z *= 1.0 + noise.exp() * random.between(-1.0, 1.0);
+            }
+            if depth_step < 0.0 {
+                z = depth_step.exp() * (z / depth_step.exp()).round();
+            }
+            z *= depth;
+            let mut point = [u * z, v * z, z];
+            for c in 0..3 {
+                point[c] = scale * (point[c] + offset[c]);
+            }
+            if random.between(0.0, 1.0) < missing {
+                point = [f32::NAN; 3];
+            } else if random.between(0.0, 1.0) < odd {
+                point = change(point);
+            }
+            points.push(point);
+        }
+        if random.below(4) == 0 {
+            let last = points.len() - 1;
+            points[last] = random.pick(&ODD)(points[last]);
+        }
+        Cloud { width, height, points }
+    }
+
     fn change(&mut self, kind: Kind, random: &mut Random) {
         let (width, height) = (self.width, self.height);
         let pixels = width * height;
@@ -201,6 +252,18 @@ impl Cloud {
     }
 }
 
+/// What becomes of a point that is out of the ordinary.
+pub const ODD: [fn([f32; 3]) -> [f32; 3]; 8] = [
+    |_| [f32::NAN; 3],
+    |_| [0.0; 3],
+    |[_, y, z]| [f32::NAN, y, z],
+    |[x, _, z]| [x, f32::INFINITY, z],
+    |[x, y, _]| [x, y, f32::INFINITY],
+    |[x, y, z]| [x, y, -z],
+    |point| point.map(|c| 100.0 * c),
+    |point| point.map(|c| 1e-3 * c),
+];
+
 /// The methods with the border policies that they support.
 pub fn methods() -> impl Iterator<Item = (Method, BorderPolicy)> {
     Method::ALL
@@ -273,6 +336,35 @@ pub fn edge_options() -> Vec<Options> {
         }
     }
     all
+}
+
+/// Any options but windows near edges.
+pub fn random_options(random: &mut Random) -> Options {
+    let methods: Vec<_> = methods().collect();
+    let size = if random.below(2) == 0 { 10.0 } else { random.between(2.01, 40.0) };
+    let mut options = options(random.pick(&methods), size, random.below(2) == 0);
+    if random.below(2) == 0 {
+        options.max_depth_change_factor = random.between(-6.0, 0.0).exp();
+    }
+    if random.below(3) == 0 {
+        options.viewpoint = [(); 3].map(|()| random.between(-3.0, 3.0));
+    }
+    if options.method != Method::Simple3DGradient {
+        options.semantics = random.pick(&Semantics::ALL);
+    }
+    options.zero_is_missing = random.below(3) == 0;
+    let paper = &mut options.paper;
+    if random.below(2) == 0 {
+        paper.alpha *= random.between(-3.0, 2.0).exp();
+        paper.beta = random.between(3.0, 9.0).exp();
+        paper.gamma = random.between(-1.0, 4.0).exp();
+        paper.smallest_radius = 1 + random.below(4) as u32;
+        paper.least_depth_radius = paper.smallest_radius + random.below(10) as u32;
+        paper.largest_radius = paper.least_depth_radius + random.below(20) as u32;
+        paper.distance_metric = random.pick(&DistanceMetric::ALL);
+        paper.depth = random.pick(&Depth::ALL);
+    }
+    options
 }
 
 /// nx, ny, nz, curvature of every pixel.
