@@ -19,7 +19,7 @@ struct Worst {
 }
 
 /// Degrees that a normal may differ from the plain form's: in AVERAGE_3D_GRADIENT and SIMPLE_3D_GRADIENT by the
-/// rounding to integers (`strips.rs` asks the plain form where that could turn a normal by 1e-4), in
+/// rounding to integers (`gradients.rs` asks the plain form where the worst case would be 1.5e-4), in
 /// AVERAGE_DEPTH_CHANGE by either (likewise), in COVARIANCE_MATRIX and the paper's methods by a hundredth of that.
 fn allowed(options: &Options) -> f64 {
     match options.method {

@@ -18,7 +18,7 @@ pub(crate) struct Scale {
 
 /// A normal is doubtful where rounding to integers could turn it by more than this, or where floats could: (sine of the
 /// angle between the tangents) < 1e-3.
-const DOUBT: f32 = 1e-4;
+const DOUBT: f32 = 1.5e-4;
 const DOUBT_SINE: f32 = 1e-6;
 
 impl Scale {
