@@ -14,7 +14,8 @@ use crate::methods::{Estimate, estimate, estimate_window, start};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
 use crate::paper::{
-    self, Asked, Blocks, Cloud, EvenWindow, EvenWindows, PaperMaps, SecondPass, with_missing_as_nan,
+    self, Asked, Blocks, Cloud, EvenWindow, EvenWindows, NO_WINDOW, PaperMaps, SecondPass,
+    with_missing_as_nan,
 };
 use crate::smoothing_area::window_side;
 use crate::threads::Workers;
@@ -418,11 +419,12 @@ impl paper::Engine for Engine<'_> {
         fast::paper::even_windows(self.isa, cloud, asked, needed, windows, self.scratch)
     }
 
-    fn choices(&mut self, even: &EvenWindows, choices: &mut Vec<Option<u32>>) -> Result<(), Error> {
+    fn choices(&mut self, even: &EvenWindows, choices: &mut Vec<u32>) -> Result<(), Error> {
+        refill(choices, repeat_n(NO_WINDOW, even.cloud.depths.len()))?;
         if self.is_plain {
-            return refill(choices, even.choices());
+            even.choose(choices);
+            return Ok(());
         }
-        refill(choices, repeat_n(None, even.cloud.depths.len()))?;
         fast::paper::choices(self.isa, even, choices, self.workers())
     }
 

@@ -2,6 +2,9 @@
 //! slope of a plane through its points. Noise of variance v in n points leaves 12 v / (n L^2) in a window of side L;
 //! points that do not lie in the window's plane, or a pixel that does not, bend it by some share of their deviation over
 //! L. And beside a crease, the one on the pixel's side.
+//!
+//! Blocks are seldom on more than two surfaces, so two of a block's pixels choose for all: the middle one, and the one
+//! to which the window of the middle one is worth least.
 
 use super::blocks::{BLOCK, MIDDLE};
 use super::cloud::Cloud;
@@ -38,6 +41,9 @@ impl EvenWindow {
     }
 }
 
+/// The choice of a pixel that takes no window.
+pub(crate) const NO_WINDOW: u32 = u32::MAX;
+
 /// The even windows that are needed, to choose from.
 pub(crate) struct EvenWindows<'a> {
     pub cloud: &'a Cloud,
@@ -53,82 +59,12 @@ impl EvenWindows<'_> {
         self.windows[block].radius as u32
     }
 
-    /// The block whose window each pixel takes, if there is one: the plain form.
-    pub fn choices(&self) -> impl ExactSizeIterator<Item = Option<u32>> {
-        let can_take = |pixel: usize| {
-            self.asked.levels[self.asked.blocks.block(pixel)] > 0 && !self.cloud.is_missing(pixel)
-        };
-        let choice = move |pixel: usize| can_take(pixel).then(|| self.best(pixel)).flatten();
-        (0..self.cloud.depths.len()).map(choice)
-    }
-
-    /// The block whose window is worth most to a pixel, among its own and those at the places of the windows that it
-    /// can take; none if there is none. Windows that end short of the pixel are taken if its point, or in inverse depth
-    /// one within the tolerance of it, lies in their plane.
-    fn best(&self, own: usize) -> Option<u32> {
-        let cloud = self.cloud;
-        let blocks = &self.asked.blocks;
-        let distance = |[dx, dy]: [f32; 2]| dx.abs().max(dy.abs());
-        let block = blocks.block(own);
-        let [column, row] = [block % blocks.across, block / blocks.across];
-        let way = |(x, y): (usize, usize)| {
-            let from = |at: usize, line: usize| at as f32 - (line * BLOCK + MIDDLE) as f32;
-            [from(x, column), from(y, row)]
-        };
-        let (mut noise, mut exact) = (f32::INFINITY, 0.0);
-        let mut found = Vec::new();
-        self.asked.for_each_place(block, |place| {
-            let window = &self.windows[place];
-            let distance = distance(way(blocks.middle(place)));
-            if window.radius > 0.0 && distance <= window.radius + REACH {
-                noise = noise.min(window.noise);
-                exact += f32::from(window.is_exact(self.asked.least_noise));
-                found.push(place);
-            }
-        });
-
-        let noise = noise.max(self.asked.least_noise);
-        let pixel = (own % cloud.width, own / cloud.width);
-        let near = self.near(pixel, exact > EXACT_SHARE * found.len() as f32);
-        let [x, y] = way(pixel);
-        let (point, tolerance) = (inverse_depth(cloud.depths[own]), self.tolerance(own));
-        let candidate = |place: usize| {
-            let window = &self.windows[place];
-            let middle = way(blocks.middle(place));
-            let [dx, dy] = middle;
-            let [across, down] = window.slope;
-            let at_middle = window.inverse_depth - across * dx - down * dy;
-            let misfit = (window.unevenness - noise).max(0.0);
-            let even = noise * window.per_noise + MISFIT * misfit * window.per_bend;
-            let per_astray = NEAR * window.per_bend;
-            let jitter = JITTER * (across * across + down * down).sqrt();
-
-            let plane = Inclined { at_middle, slope: window.slope };
-            let at_near = plane.at([x + near.offset[0], y + near.offset[1]]);
-            let astray = near.inverse_depth - at_near;
-            let astray = (astray * astray - NEAR_NOISE * noise / near.points).max(0.0);
-            let short = (distance([x - dx, y - dy]) - window.radius).max(0.0);
-            let cost = (even + astray * per_astray) * (1.0 + short * short);
-            let lies_in = || (point - plane.at([x, y])).abs() < tolerance + jitter;
-            (short == 0.0 || lies_in()).then_some(Candidate { place, plane, middle, cost })
-        };
-        let candidates: Vec<Candidate> = found.into_iter().filter_map(candidate).collect();
-        let (mut best, mut least) = (None, f32::INFINITY);
-        for candidate in &candidates {
-            if candidate.cost < least {
-                (best, least) = (Some(candidate), ALIKE * candidate.cost);
-            }
+    /// The block whose window each pixel takes, or [`NO_WINDOW`]: the plain form.
+    pub fn choose(&self, choices: &mut [u32]) {
+        let levels = self.asked.levels.iter().enumerate();
+        for (block, _) in levels.filter(|(_, level)| **level > 0) {
+            Candidates::of(self, block).choose(choices);
         }
-        // By chance the pixel may be nearer to the plane beyond a crease.
-        let mut chosen = best?;
-        least *= CREASE_COST;
-        for candidate in &candidates {
-            if candidate.cost < least && candidate.is_this_side([x, y], best?, CREASE_NOISE * noise)
-            {
-                (chosen, least) = (candidate, ALIKE * candidate.cost);
-            }
-        }
-        Some(chosen.place as u32)
     }
 
     /// How far from a plane a pixel's point may lie to be on that surface, in inverse depth: half a depth change.
@@ -136,13 +72,172 @@ impl EvenWindows<'_> {
         let depth = self.cloud.depths[at];
         super::least_depth_change(depth, self.options) / (depth * depth) / 2.0
     }
+}
+
+/// The windows that a block's pixels can take: its own and those at the places around it.
+struct Candidates<'a> {
+    even: &'a EvenWindows<'a>,
+    /// The block's middle, inside the image or not.
+    middle: [usize; 2],
+    windows: Vec<Candidate>,
+    /// The least variance among them, and whether they say that depths are exact.
+    noise: f32,
+    is_exact: bool,
+}
+
+impl<'a> Candidates<'a> {
+    fn of(even: &'a EvenWindows, block: usize) -> Self {
+        let &EvenWindows { asked, .. } = even;
+        let blocks = &asked.blocks;
+        let [column, row] = [block % blocks.across, block / blocks.across];
+        let middle = [column, row].map(|line| line * BLOCK + MIDDLE);
+        let (windows, noise) = (Vec::new(), f32::INFINITY);
+        let mut found = Candidates { even, middle, windows, noise, is_exact: false };
+        let mut exact = 0.0;
+        asked.for_each_place(block, |place| {
+            let window = even.windows[place];
+            let middle = found.way(blocks.middle(place));
+            if window.radius > 0.0 && length(middle) <= window.radius + REACH {
+                found.noise = window.noise.min(found.noise);
+                exact += f32::from(window.is_exact(asked.least_noise));
+                found.windows.push(Candidate::new(place, window, middle));
+            }
+        });
+        found.noise = found.noise.max(asked.least_noise);
+        found.is_exact = exact > EXACT_SHARE * found.windows.len() as f32;
+        for Candidate { window, cost, .. } in &mut found.windows {
+            let misfit = (window.unevenness - found.noise).max(0.0);
+            *cost = found.noise * window.per_noise + MISFIT * misfit * window.per_bend;
+        }
+        found
+    }
+
+    /// The way to a pixel from the block's middle.
+    fn way(&self, (x, y): (usize, usize)) -> [f32; 2] {
+        [x as f32 - self.middle[0] as f32, y as f32 - self.middle[1] as f32]
+    }
+
+    /// Writes what the block's pixels take.
+    fn choose(&self, choices: &mut [u32]) {
+        let EvenWindows { cloud, asked, .. } = self.even;
+        let [x, y] = self.middle.map(|middle| middle - MIDDLE);
+        let ends = [(x, cloud.width), (y, cloud.height)].map(|(at, end)| (at + BLOCK).min(end));
+        let inside = Rect { x: x..ends[0], y: y..ends[1] };
+        let takes_some = |&(x, y): &(usize, usize)| {
+            let at = cloud.index(x, y);
+            asked.concerned[at] && !cloud.is_missing(at)
+        };
+        let pixels: Vec<Pixel> =
+            inside.pixels().filter(takes_some).map(|pixel| self.pixel(pixel)).collect();
+        let is_middle = |pixel: &&Pixel| pixel.way == [0.0; 2];
+        let Some(first) = pixels.iter().find(is_middle).or(pixels.first()) else { return };
+        let best_of_first = self.best(first);
+        let (mut second, mut largest) = (first, -1.0);
+        for pixel in &pixels {
+            let cost = if pixel.at == first.at { 0.0 } else { self.cost(best_of_first, pixel) };
+            if ALIKE * cost > largest {
+                (second, largest) = (pixel, cost);
+            }
+        }
+        let best_of_second = self.best(second);
+        for pixel in &pixels {
+            let best = if pixel.at == second.at {
+                best_of_second
+            } else if pixel.at == first.at {
+                best_of_first
+            } else {
+                self.better(best_of_first, best_of_second, pixel)
+            };
+            choices[pixel.at] = best.map_or(NO_WINDOW, |best| best.place as u32);
+        }
+    }
+
+    /// The window that is worth more to a pixel, and beside a crease, the one on its side; none that it cannot take.
+    fn better<'w>(
+        &self,
+        first: Option<&'w Candidate>,
+        second: Option<&'w Candidate>,
+        pixel: &Pixel,
+    ) -> Option<&'w Candidate> {
+        let costs = [first, second].map(|window| self.cost(window, pixel));
+        let (mut better, mut other) = ((first, costs[0]), (second, costs[1]));
+        if costs[1] < ALIKE * costs[0] {
+            (better, other) = (other, better);
+        }
+        let (window, cost) = better;
+        if let (Some(window), (Some(beyond), cost_beyond)) = (window, other)
+            && cost_beyond < ALIKE * CREASE_COST * cost
+            && self.is_side_of(beyond, window, pixel)
+        {
+            return Some(beyond);
+        }
+        window.filter(|_| cost.is_finite())
+    }
+
+    /// The window that is worth most to a pixel, if there is one that it can take.
+    fn best(&self, pixel: &Pixel) -> Option<&Candidate> {
+        let costs = self.windows.iter().map(|window| (window, self.cost(Some(window), pixel)));
+        let (mut best, mut least) = (None, f32::INFINITY);
+        for (window, cost) in costs.clone() {
+            if cost < least {
+                (best, least) = (Some(window), ALIKE * cost);
+            }
+        }
+        // By chance the pixel may be nearer to the plane beyond a crease.
+        let mut chosen = best?;
+        least *= CREASE_COST;
+        for (window, cost) in costs {
+            if cost < least && self.is_side_of(window, best?, pixel) {
+                (chosen, least) = (window, ALIKE * cost);
+            }
+        }
+        Some(chosen)
+    }
+
+    /// What a window costs a pixel; infinite for none. One that ends short of the pixel can be taken if its point, or
+    /// in inverse depth one within the tolerance of it, lies in the window's plane.
+    fn cost(&self, window: Option<&Candidate>, pixel: &Pixel) -> f32 {
+        let Some(Candidate { window, middle: [dx, dy], plane, cost: even, jitter, .. }) = window
+        else {
+            return f32::INFINITY;
+        };
+        let [x, y] = pixel.way;
+        let astray = pixel.near.inverse_depth - plane.at(pixel.near.way);
+        let astray = (astray * astray - NEAR_NOISE * self.noise / pixel.near.points).max(0.0);
+        let short = (length([x - dx, y - dy]) - window.radius).max(0.0);
+        let cost = (even + astray * (NEAR * window.per_bend)) * (1.0 + short * short);
+        let lies_in = || (pixel.inverse_depth - plane.at([x, y])).abs() < pixel.tolerance + jitter;
+        if short == 0.0 || lies_in() { cost } else { f32::INFINITY }
+    }
+
+    /// Whether there is a crease between a window and another, and the pixel on the window's side of it: there the
+    /// same plane is in front as in the middle of this window, and behind in that of the other.
+    fn is_side_of(&self, window: &Candidate, other: &Candidate, pixel: &Pixel) -> bool {
+        let gap = window.plane.minus(&other.plane);
+        let (here, there) = (gap.at(window.middle), gap.at(other.middle));
+        let least_gap = here.abs().min(there.abs());
+        least_gap * least_gap > CREASE_NOISE * self.noise
+            && here * there < 0.0
+            && here * gap.at(pixel.way) > 0.0
+    }
+
+    fn pixel(&self, (x, y): (usize, usize)) -> Pixel {
+        let at = self.even.cloud.index(x, y);
+        Pixel {
+            at,
+            way: self.way((x, y)),
+            inverse_depth: inverse_depth(self.even.cloud.depths[at]),
+            tolerance: self.even.tolerance(at),
+            near: self.near((x, y)),
+        }
+    }
 
     /// The mean of the pixel and those next to it, but of the pixel alone if there is a depth change among them or
     /// depths are exact.
-    fn near(&self, (x, y): (usize, usize), is_exact: bool) -> Near {
-        let cloud = self.cloud;
-        let is_clean = self.asked.clean[cloud.index(x, y)] > 0;
-        let reach = usize::from(is_clean && !is_exact);
+    fn near(&self, (x, y): (usize, usize)) -> Near {
+        let EvenWindows { cloud, asked, .. } = self.even;
+        let is_clean = asked.clean[cloud.index(x, y)] > 0;
+        let reach = usize::from(is_clean && !self.is_exact);
         let (mut sums, mut points) = ([0.0; 3], 0.0);
         for (column, row) in Rect::around((x, y), reach, (cloud.width, cloud.height)).pixels() {
             let inverse = inverse_depth(cloud.depths[cloud.index(column, row)]);
@@ -155,28 +250,47 @@ impl EvenWindows<'_> {
             }
         }
         let [inverse_depth, dx, dy] = sums.map(|sum| sum / points);
-        Near { inverse_depth, offset: [dx, dy], points }
+        let [x, y] = self.way((x, y));
+        Near { inverse_depth, way: [x + dx, y + dy], points }
     }
 }
 
-/// A window that a pixel can take, and what it costs. Places are in pixels from the middle of the pixel's block.
+/// How far a way leads along the rows or the columns, whichever is more.
+fn length([dx, dy]: [f32; 2]) -> f32 {
+    dx.abs().max(dy.abs())
+}
+
+/// A window that a block's pixels can take. Places are in pixels from the block's middle.
 struct Candidate {
+    /// Its own block.
     place: usize,
-    plane: Inclined,
+    window: EvenWindow,
     middle: [f32; 2],
+    plane: Inclined,
+    /// How far the sensor's noise along rows and columns moves points off the plane.
+    jitter: f32,
+    /// What it costs any pixel.
     cost: f32,
 }
 
 impl Candidate {
-    /// Whether there is a crease between this window and another, and the pixel on this one's side of it: there the
-    /// same plane is in front as in the middle of this window, and behind in that of the other. `least` is the least
-    /// squared distance between the planes of two surfaces.
-    fn is_this_side(&self, pixel: [f32; 2], other: &Candidate, least: f32) -> bool {
-        let gap = self.plane.minus(&other.plane);
-        let (here, there) = (gap.at(self.middle), gap.at(other.middle));
-        let least_gap = here.abs().min(there.abs());
-        least_gap * least_gap > least && here * there < 0.0 && here * gap.at(pixel) > 0.0
+    fn new(place: usize, window: EvenWindow, middle: [f32; 2]) -> Self {
+        let [across, down] = window.slope;
+        let at_middle = window.inverse_depth - across * middle[0] - down * middle[1];
+        let plane = Inclined { at_middle, slope: window.slope };
+        let jitter = JITTER * (across * across + down * down).sqrt();
+        Candidate { place, window, middle, plane, jitter, cost: f32::INFINITY }
     }
+}
+
+/// A pixel that takes a window.
+struct Pixel {
+    at: usize,
+    /// Where it is from the block's middle.
+    way: [f32; 2],
+    inverse_depth: f32,
+    tolerance: f32,
+    near: Near,
 }
 
 /// A plane by its inverse depth at the middle pixel of a block, and its change per pixel to the right and down.
@@ -197,9 +311,9 @@ impl Inclined {
     }
 }
 
-/// The mean inverse depth of points next to a pixel, their number, and the mean of their places from there.
+/// The mean inverse depth of points next to a pixel, the mean of their places from the block's middle, and their number.
 struct Near {
     inverse_depth: f32,
-    offset: [f32; 2],
+    way: [f32; 2],
     points: f32,
 }

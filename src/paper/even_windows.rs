@@ -47,6 +47,8 @@ pub(crate) struct EvenWindow {
 /// What windows are asked for.
 pub(crate) struct Asked<'a> {
     pub blocks: Blocks,
+    /// The pixels that take one.
+    pub concerned: &'a [bool],
     /// The radius that the depth asks for, block by block, at most `limit`; 0 where all points are missing.
     pub wanted: &'a [u32],
     /// From how many radii the windows come that a block's pixels can take, starting with the largest and halving it,

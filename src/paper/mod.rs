@@ -21,7 +21,8 @@ mod surroundings;
 
 pub(crate) use blocks::{BLOCK, Blocks, MIDDLE, middle};
 pub(crate) use choices::{
-    ALIKE, CREASE_COST, CREASE_NOISE, EXACT_SHARE, EvenWindows, MISFIT, NEAR, NEAR_NOISE, REACH,
+    ALIKE, CREASE_COST, CREASE_NOISE, EXACT_SHARE, EvenWindows, MISFIT, NEAR, NEAR_NOISE,
+    NO_WINDOW, REACH,
 };
 pub(crate) use cloud::{CleanPoints, Cleaned, Cloud};
 pub(crate) use even_windows::{

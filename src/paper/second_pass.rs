@@ -3,7 +3,7 @@
 use std::iter::{once, repeat_n};
 
 use super::blocks::{BLOCK, Blocks, MIDDLE};
-use super::choices::EvenWindows;
+use super::choices::{EvenWindows, NO_WINDOW};
 use super::cloud::Cloud;
 use super::creases::SummedNormals;
 use super::even_windows::{Asked, EvenWindow};
@@ -35,8 +35,8 @@ pub(crate) trait Engine {
         windows: &mut Vec<EvenWindow>,
     ) -> Result<(), Error>;
 
-    /// The block whose window each pixel takes, if there is one.
-    fn choices(&mut self, even: &EvenWindows, choices: &mut Vec<Option<u32>>) -> Result<(), Error>;
+    /// The block whose window each pixel takes, or [`NO_WINDOW`].
+    fn choices(&mut self, even: &EvenWindows, choices: &mut Vec<u32>) -> Result<(), Error>;
 
     /// The estimates of windows around blocks' middle pixels, for the blocks that have one, by their radii.
     fn of_blocks(
@@ -60,7 +60,7 @@ pub(crate) struct SecondPass {
     wanted: Vec<u32>,
     levels: Vec<u8>,
     windows: Vec<EvenWindow>,
-    choices: Vec<Option<u32>>,
+    choices: Vec<u32>,
     /// The radii of the windows that some pixel takes, and their estimates.
     taken: Vec<u32>,
     second: Vec<[f32; 4]>,
@@ -100,18 +100,19 @@ impl SecondPass {
         }
         let blocks = Blocks::of(cloud.width, cloud.height);
         self.concern(cloud, &blocks, options, engine.workers())?;
-        let SecondPass { wanted, levels, windows, choices, taken, second, .. } = self;
+        let SecondPass { concerned, wanted, levels, windows, choices, taken, second, .. } = self;
         let clean = depth_changes(cloud, options, engine.workers())?;
         let clean = clean.not_explained(cloud, engine.workers()).clean_radii()?;
         let least_noise = Asked::least_noise(options.paper.alpha);
         let limit = options.paper.largest_radius;
-        let asked = Asked { blocks, wanted, levels, clean: &clean, limit, least_noise };
+        let clean = &clean;
+        let asked = Asked { blocks, concerned, wanted, levels, clean, limit, least_noise };
         engine.even_windows(cloud, &asked, &asked.needed()?, windows)?;
         let even = EvenWindows { cloud, asked: &asked, options, windows };
         engine.choices(&even, choices)?;
         refill(taken, repeat_n(0, blocks.count()))?;
         // Marked first, as many pixels take the same.
-        for block in choices.iter().flatten() {
+        for block in choices.iter().filter(|choice| **choice != NO_WINDOW) {
             taken[*block as usize] = 1;
         }
         for (block, radius) in taken.iter_mut().enumerate().filter(|(_, taken)| **taken > 0) {
@@ -177,7 +178,8 @@ impl SecondPass {
         if !(asks(options) && self.concerned[at]) {
             return first.into();
         }
-        let of_choice = self.choices[at].map(|block| self.second[block as usize].into());
+        let choice = Some(self.choices[at]).filter(|choice| *choice != NO_WINDOW);
+        let of_choice = choice.map(|block| self.second[block as usize].into());
         let of_choice = of_choice.filter(|found: &Estimate| !found.normal[0].is_nan());
         let around = || {
             let pixel = (at % cloud.width, at / cloud.width);

@@ -25,7 +25,7 @@ use crate::simd::{Along, Groups, Simd};
 #[inline(always)]
 pub(super) unsafe fn rows<S: Groups>(
     even: &EvenWindows,
-    rows: &mut dyn Iterator<Item = (usize, &mut [Option<u32>])>,
+    rows: &mut dyn Iterator<Item = (usize, &mut [u32])>,
 ) -> Result<(), Error> {
     let Blocks { across, .. } = even.asked.blocks;
     let mut concerned = Vec::new();
@@ -45,11 +45,7 @@ pub(super) unsafe fn rows<S: Groups>(
             unsafe {
                 group.candidates(&mut found)?;
                 found.weigh(even.asked.least_noise);
-                for (y, choices) in choices.chunks_mut(even.cloud.width).enumerate() {
-                    for x in 0..BLOCK {
-                        group.choose(&mut found, &neighbours, [x, y], choices);
-                    }
-                }
+                group.choose(&mut found, &neighbours, choices);
             }
         }
     }
@@ -74,25 +70,31 @@ struct Lines<S: Simd> {
     from_own: Floats<S>,
 }
 
-/// Windows that the pixels of a group may take, one each.
+/// Windows that the pixels of a group may take, one for each block.
 struct Candidates<S: Simd> {
     /// The blocks whose windows they are.
     places: [u32; LANES],
     /// Their fields.
-    windows: [Floats<S>; FIELDS],
+    fields: [Floats<S>; FIELDS],
     /// The mask of the blocks that may take theirs.
     may_take: S::F,
-    /// Where the windows' middles are, from the blocks' middle pixels.
-    middles: [Floats<S>; 2],
+    windows: Windows<S>,
+    /// What they cost a pixel of each block.
+    cost: Floats<S>,
+}
+
+/// Windows, one for each block of a group.
+#[derive(Clone, Copy)]
+struct Windows<S: Simd> {
+    /// Where their middles are, from the blocks' middle pixels.
+    middle: [Floats<S>; 2],
     radius: Floats<S>,
     planes: Inclined<S>,
     per_bend: Floats<S>,
-    /// What the windows cost any pixel; infinite for those that may not take theirs.
+    /// What they cost any pixel; infinite for those that may not take theirs.
     even: Floats<S>,
     /// How far the sensor's noise along rows and columns moves points off the plane.
     jitter: Floats<S>,
-    /// What the windows cost a pixel of each block; infinite where they end short of it and of its surface.
-    cost: Floats<S>,
 }
 
 /// The fields of an [`EvenWindow`].
@@ -119,49 +121,114 @@ impl<S: Simd> Inclined<S> {
         let slope = [across - other.slope[0], down - other.slope[1]];
         Inclined { at_middle: self.at_middle - other.at_middle, slope }
     }
+}
+
+/// A pixel of each block of a group.
+#[derive(Clone, Copy)]
+struct Pixels<S: Simd> {
+    /// Its number in the block.
+    number: Floats<S>,
+    /// Where it is, from the block's middle pixel.
+    at: [Floats<S>; 2],
+    /// The mask of those that are not missing.
+    there: S::F,
+    inverse_depth: Floats<S>,
+    tolerance: Floats<S>,
+    near: Near<S>,
+}
+
+/// Of the points next to a pixel of each block, as the plain form has them.
+#[derive(Clone, Copy)]
+struct Near<S: Simd> {
+    inverse_depth: Floats<S>,
+    at: [Floats<S>; 2],
+    points: Floats<S>,
+}
+
+impl<S: Simd> Windows<S> {
+    /// Of no block.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn none() -> Self {
+        // SAFETY: as the caller's.
+        let [zero, even] = unsafe { [0.0, f32::INFINITY].map(|value| Floats::splat(value)) };
+        let planes = Inclined { at_middle: zero, slope: [zero; 2] };
+        Windows { middle: [zero; 2], radius: zero, planes, per_bend: zero, even, jitter: zero }
+    }
 
     /// Takes the others of a mask.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn replace(&mut self, mask: S::F, other: &Inclined<S>) {
+    unsafe fn replace(&mut self, mask: S::F, other: &Self) {
         // SAFETY: as the caller's.
         unsafe {
-            self.at_middle.0 = S::select(mask, other.at_middle.0, self.at_middle.0);
-            for (own, other) in self.slope.iter_mut().zip(other.slope) {
-                own.0 = S::select(mask, other.0, own.0);
+            let select = |to: &mut Floats<S>, other: Floats<S>| {
+                to.0 = S::select(mask, other.0, to.0);
+            };
+            for axis in 0..2 {
+                select(&mut self.middle[axis], other.middle[axis]);
+                select(&mut self.planes.slope[axis], other.planes.slope[axis]);
             }
+            select(&mut self.planes.at_middle, other.planes.at_middle);
+            select(&mut self.radius, other.radius);
+            select(&mut self.per_bend, other.per_bend);
+            select(&mut self.even, other.even);
+            select(&mut self.jitter, other.jitter);
+        }
+    }
+
+    /// What the windows cost a pixel of each block; infinite where they end short of it and of its surface.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn cost(&self, pixels: &Pixels<S>, noise: Floats<S>) -> Floats<S> {
+        let &Windows { middle: [dx, dy], radius, planes, per_bend, even, jitter } = self;
+        let Near { inverse_depth, at, points } = pixels.near;
+        // SAFETY: as the caller's.
+        unsafe {
+            let (zero, one) = (Floats::splat(0.0), Floats::splat(1.0));
+            let astray = inverse_depth - planes.at(at);
+            let near_noise = Floats::splat(NEAR_NOISE) * noise / points;
+            let astray = (astray * astray - near_noise).max(zero);
+            let [x, y] = pixels.at;
+            let distance = (x - dx).abs().max((y - dy).abs());
+            let short = (distance - radius).max(zero);
+            let cost = (even + astray * (Floats::splat(NEAR) * per_bend)) * (one + short * short);
+            let off = (pixels.inverse_depth - planes.at(pixels.at)).abs();
+            let lies_in = S::lt(off.0, (pixels.tolerance + jitter).0);
+            let is_beyond = S::and_not(lies_in, S::lt(zero.0, short.0));
+            Floats(S::select(is_beyond, S::splat(f32::INFINITY), cost.0))
         }
     }
 }
 
-/// Of the points next to a pixel of each block, as the plain form has them.
-struct Near<S: Simd> {
-    inverse_depth: Floats<S>,
-    offset: [Floats<S>; 2],
-    points: Floats<S>,
-    /// The pixels' own inverse depths.
-    own: Floats<S>,
-}
-
-impl<S: Simd> Candidates<S> {
+impl<S: Simd> Pixels<S> {
+    /// Takes the others of a mask.
+    ///
     /// # Safety
     /// The processor has the instruction set of `S`.
-    unsafe fn none() -> Self {
+    #[inline(always)]
+    unsafe fn replace(&mut self, mask: S::F, other: &Self) {
         // SAFETY: as the caller's.
-        let zero = unsafe { Floats::splat(0.0) };
-        Candidates {
-            places: [0; LANES],
-            windows: [zero; FIELDS],
-            may_take: zero.0,
-            middles: [zero; 2],
-            radius: zero,
-            planes: Inclined { at_middle: zero, slope: [zero; 2] },
-            per_bend: zero,
-            even: zero,
-            jitter: zero,
-            cost: zero,
+        unsafe {
+            let select = |to: &mut Floats<S>, other: Floats<S>| {
+                to.0 = S::select(mask, other.0, to.0);
+            };
+            for axis in 0..2 {
+                select(&mut self.at[axis], other.at[axis]);
+                select(&mut self.near.at[axis], other.near.at[axis]);
+            }
+            select(&mut self.number, other.number);
+            self.there = S::select(mask, other.there, self.there);
+            select(&mut self.inverse_depth, other.inverse_depth);
+            select(&mut self.tolerance, other.tolerance);
+            select(&mut self.near.inverse_depth, other.near.inverse_depth);
+            select(&mut self.near.points, other.near.points);
         }
     }
 }
@@ -197,7 +264,10 @@ impl<S: Along> Found<S> {
         if self.number == self.candidates.len() {
             self.candidates.try_reserve(1)?;
             // SAFETY: as the caller's.
-            self.candidates.push(unsafe { Candidates::none() });
+            let (zero, windows) = unsafe { (Floats::splat(0.0), Windows::none()) };
+            let (places, fields) = ([0; LANES], [zero; FIELDS]);
+            let none = Candidates { places, fields, may_take: zero.0, windows, cost: zero };
+            self.candidates.push(none);
         }
         let to = &mut self.candidates[self.number];
         self.number += 1;
@@ -205,7 +275,7 @@ impl<S: Along> Found<S> {
             to.places[lane] = place(lane) as u32;
         }
         to.may_take = may_take;
-        to.middles = [columns.from_own, rows.from_own];
+        to.windows.middle = [columns.from_own, rows.from_own];
         for first in [0, 4] {
             // SAFETY: as the caller's; a window is eight floats.
             unsafe {
@@ -216,7 +286,7 @@ impl<S: Along> Found<S> {
                 }
                 let fields = S::transpose_fours(fields);
                 for i in 0..4 {
-                    to.windows[first + i] = Floats(fields[i]);
+                    to.fields[first + i] = Floats(fields[i]);
                 }
             }
         }
@@ -235,17 +305,17 @@ impl<S: Along> Found<S> {
             let least_noise = Floats::<S>::splat(least_noise);
             let (mut least, mut there, mut exact) = (Floats::splat(f32::INFINITY), zero, zero);
             for to in &mut self.candidates[..self.number] {
-                let [radius, inverse_depth, across, down, _, noise, _, per_bend] = to.windows;
-                let [dx, dy] = to.middles;
+                let [radius, inverse_depth, across, down, _, noise, _, per_bend] = to.fields;
+                let [dx, dy] = to.windows.middle;
                 let is_near =
                     S::lt(dx.abs().max(dy.abs()).0, (radius + Floats::splat(REACH + 1.0)).0);
                 to.may_take = S::and(to.may_take, S::and(is_near, S::lt(zero.0, radius.0)));
-                to.radius = radius;
+                to.windows.radius = radius;
                 let at_middle = inverse_depth - across * dx - down * dy;
-                to.planes = Inclined { at_middle, slope: [across, down] };
+                to.windows.planes = Inclined { at_middle, slope: [across, down] };
                 let steepness_squared = across * across + down * down;
-                to.jitter = Floats::splat(JITTER) * steepness_squared.sqrt();
-                to.per_bend = per_bend;
+                to.windows.jitter = Floats::splat(JITTER) * steepness_squared.sqrt();
+                to.windows.per_bend = per_bend;
                 least.0 = S::select(to.may_take, S::min(noise.0, least.0), least.0);
                 let is_exact = S::and(
                     S::lt(noise.0, least_noise.0),
@@ -258,11 +328,48 @@ impl<S: Along> Found<S> {
             self.exact = S::lt((Floats::splat(EXACT_SHARE) * there).0, exact.0);
             self.noise = least.max(least_noise);
             for to in &mut self.candidates[..self.number] {
-                let [_, _, _, _, unevenness, _, per_noise, _] = to.windows;
+                let [_, _, _, _, unevenness, _, per_noise, per_bend] = to.fields;
                 let misfit = (unevenness - self.noise).max(zero);
-                let even = self.noise * per_noise + Floats::splat(MISFIT) * misfit * to.per_bend;
-                to.even = Floats(S::select(to.may_take, even.0, S::splat(f32::INFINITY)));
+                let even = self.noise * per_noise + Floats::splat(MISFIT) * misfit * per_bend;
+                to.windows.even = Floats(S::select(to.may_take, even.0, S::splat(f32::INFINITY)));
             }
+        }
+    }
+
+    /// The numbers of the windows that are worth most to a pixel of each block, -1 for none, and the windows.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn best(&mut self, pixels: &Pixels<S>) -> (Floats<S>, Windows<S>) {
+        let noise = self.noise;
+        let found = &mut self.candidates[..self.number];
+        // SAFETY: as the caller's.
+        unsafe {
+            let alike = Floats::splat(ALIKE);
+            let mut least = Floats::<S>::splat(f32::INFINITY);
+            let mut best = S::splat(-1.0);
+            let mut windows = Windows::none();
+            for (number, candidates) in found.iter_mut().enumerate() {
+                let cost = candidates.windows.cost(pixels, noise);
+                candidates.cost = cost;
+                let better = S::lt(cost.0, least.0);
+                least.0 = S::select(better, (alike * cost).0, least.0);
+                best = S::select(better, S::splat(number as f32), best);
+                windows.replace(better, &candidates.windows);
+            }
+            // By chance the pixel may be nearer to the plane beyond a crease.
+            least = Floats::splat(CREASE_COST) * least;
+            let first = windows;
+            for (number, candidates) in found.iter().enumerate() {
+                let is_better = S::lt(candidates.cost.0, least.0);
+                let crease = Crease::between(&candidates.windows, &first, noise);
+                let better = S::and(is_better, crease.is_first_side(pixels.at));
+                least.0 = S::select(better, (alike * candidates.cost).0, least.0);
+                best = S::select(better, S::splat(number as f32), best);
+                windows.replace(better, &candidates.windows);
+            }
+            (Floats(best), windows)
         }
     }
 }
@@ -323,78 +430,144 @@ impl Group<'_> {
         Ok(())
     }
 
-    /// Of the windows `found`, those that are worth most to the blocks' pixels in this column and row of theirs, for
-    /// the choices of that row.
+    /// Of the windows `found`, those that the blocks' pixels take, for the choices of their rows.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn choose<S: Simd>(
+    unsafe fn choose<S: Along>(
         &self,
         found: &mut Found<S>,
         neighbours: &Neighbours,
-        [column, row]: [usize; 2],
-        choices: &mut [Option<u32>],
+        choices: &mut [u32],
     ) {
-        let x = |lane: usize| self.blocks[lane] * BLOCK + column;
+        let width = self.even.cloud.width;
         // SAFETY: as the caller's.
         unsafe {
-            let (depth, clean) = neighbours.own::<S>(self.first, [column, row]);
-            let there = S::bits(S::eq(depth, depth));
-            let tolerance = tolerance::<S>(depth, self.even.options);
-            let noisy = S::and_not(found.exact, S::lt(S::splat(0.0), clean));
-            let near = neighbours.near::<S>(self.first, [column, row], noisy);
-            let (zero, one) = (Floats::splat(0.0), Floats::splat(1.0));
-            let [column, row] = [column, row].map(|at| Floats::splat(at as f32 - MIDDLE as f32));
-            let near_noise = Floats::splat(NEAR_NOISE) * found.noise / near.points;
-            let at_near = [column + near.offset[0], row + near.offset[1]];
-            let crease_noise = Floats::splat(CREASE_NOISE) * found.noise;
-            let alike = Floats::splat(ALIKE);
-            let mut least = Floats::<S>::splat(f32::INFINITY);
-            let mut best = S::splat(-1.0);
-            let mut planes = Inclined { at_middle: zero, slope: [zero; 2] };
-            let mut middle = [zero; 2];
-            let found = &mut found.candidates[..found.number];
-            for (number, candidates) in found.iter_mut().enumerate() {
-                let astray = near.inverse_depth - candidates.planes.at(at_near);
-                let astray = (astray * astray - near_noise).max(zero);
-                let per_astray = Floats::splat(NEAR) * candidates.per_bend;
-                let [dx, dy] = candidates.middles;
-                let distance = (column - dx).abs().max((row - dy).abs());
-                let short = (distance - candidates.radius).max(zero);
-                let cost = (candidates.even + astray * per_astray) * (one + short * short);
-                let off = (near.own - candidates.planes.at([column, row])).abs();
-                let lies_in = S::lt(off.0, (tolerance + candidates.jitter).0);
-                let is_beyond = S::and_not(lies_in, S::lt(zero.0, short.0));
-                candidates.cost.0 = S::select(is_beyond, S::splat(f32::INFINITY), cost.0);
-                let better = S::lt(candidates.cost.0, least.0);
-                least.0 = S::select(better, (alike * cost).0, least.0);
-                best = S::select(better, S::splat(number as f32), best);
-                planes.replace(better, &candidates.planes);
-                middle[0].0 = S::select(better, dx.0, middle[0].0);
-                middle[1].0 = S::select(better, dy.0, middle[1].0);
+            let mut pixels = [self.pixels(found, neighbours, 0); BLOCK * BLOCK];
+            for number in 1..BLOCK * BLOCK {
+                pixels[number] = self.pixels(found, neighbours, number);
             }
-            // By chance the pixel may be nearer to the plane beyond a crease.
-            least = Floats::splat(CREASE_COST) * least;
-            for (number, candidates) in found.iter().enumerate() {
-                let is_better = S::lt(candidates.cost.0, least.0);
-                let gap = candidates.planes.minus(&planes);
-                let (here, there) = (gap.at(candidates.middles), gap.at(middle));
-                let least_gap = Floats::<S>(S::min(here.abs().0, there.abs().0));
-                let are_two = S::lt(crease_noise.0, (least_gap * least_gap).0);
-                let is_crease = S::and(are_two, S::lt((here * there).0, zero.0));
-                let is_this_side = S::lt(zero.0, (here * gap.at([column, row])).0);
-                let better = S::and(is_better, S::and(is_crease, is_this_side));
-                least.0 = S::select(better, (alike * candidates.cost).0, least.0);
-                best = S::select(better, S::splat(number as f32), best);
+            let mut first = pixels[MIDDLE * BLOCK + MIDDLE];
+            for other in &pixels {
+                first.replace(S::and_not(first.there, other.there), other);
             }
-            let mut numbers = [0; LANES];
-            S::store_i(numbers.as_mut_ptr(), S::truncate_i(best));
-            for lane in Bits(there) {
-                let best = found.get(numbers[lane] as usize);
-                choices[x(lane)] = best.map(|candidates| candidates.places[lane]);
+            let (first_best, first_windows) = found.best(&first);
+            let mut first_costs = [found.noise; BLOCK * BLOCK];
+            for number in 0..BLOCK * BLOCK {
+                first_costs[number] = first_windows.cost(&pixels[number], found.noise);
+            }
+            let (mut second, mut largest) = (first, S::splat(-1.0));
+            for (other, cost) in pixels.iter().zip(first_costs) {
+                let is_first = S::eq(other.number.0, first.number.0);
+                let cost = Floats::<S>(S::and_not(is_first, cost.0));
+                let alike = cost * Floats::splat(ALIKE);
+                let worse = S::and(other.there, S::lt(largest, alike.0));
+                second.replace(worse, other);
+                largest = S::select(worse, cost.0, largest);
+            }
+            let (second_best, second_windows) = found.best(&second);
+            let crease = Crease::between(&first_windows, &second_windows, found.noise);
+            for ((number, own), first_cost) in pixels.iter().enumerate().zip(first_costs) {
+                let second_cost = second_windows.cost(own, found.noise);
+                let (alike, times) = (Floats::splat(ALIKE), Floats::splat(ALIKE * CREASE_COST));
+                let is_better = S::lt(second_cost.0, (alike * first_cost).0);
+                let to_first = S::and(
+                    crease.is_first_side(own.at),
+                    S::lt(first_cost.0, (times * second_cost).0),
+                );
+                let to_second = S::and(
+                    crease.is_second_side(own.at),
+                    S::lt(second_cost.0, (times * first_cost).0),
+                );
+                let takes_second = S::or(S::and_not(to_first, is_better), to_second);
+                let takes_second = S::and_not(S::eq(own.number.0, first.number.0), takes_second);
+                let takes_second = S::or(takes_second, S::eq(own.number.0, second.number.0));
+                let best = S::select(takes_second, second_best.0, first_best.0);
+                let cost = S::select(takes_second, second_cost.0, first_cost.0);
+                let takes_some = S::bits(S::and(own.there, S::lt(cost, S::splat(f32::INFINITY))));
+                let mut numbers = [0; LANES];
+                S::store_i(numbers.as_mut_ptr(), S::truncate_i(best));
+                let row = number / BLOCK * width + number % BLOCK;
+                for lane in Bits(takes_some) {
+                    let place = found.candidates[numbers[lane] as usize].places[lane];
+                    choices[row + self.blocks[lane] * BLOCK] = place;
+                }
             }
         }
+    }
+
+    /// The pixels of a number in the blocks.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn pixels<S: Along>(
+        &self,
+        found: &Found<S>,
+        neighbours: &Neighbours,
+        number: usize,
+    ) -> Pixels<S> {
+        let place = [number % BLOCK, number / BLOCK];
+        // SAFETY: as the caller's.
+        unsafe {
+            let (depth, clean) = neighbours.own::<S>(self.first, place);
+            let noisy = S::and_not(found.exact, S::lt(S::splat(0.0), clean));
+            let (inverse_depth, near) = neighbours.near::<S>(self.first, place, noisy);
+            Pixels {
+                number: Floats::splat(number as f32),
+                at: [from_middle(place[0]), from_middle(place[1])],
+                there: S::eq(depth, depth),
+                inverse_depth,
+                tolerance: tolerance::<S>(depth, self.even.options),
+                near,
+            }
+        }
+    }
+}
+
+/// How far a column or row of a block is from its middle.
+#[inline(always)]
+fn from_middle<S: Simd>(line: usize) -> Floats<S> {
+    // SAFETY: TODO
+    unsafe { Floats::splat(line as f32 - MIDDLE as f32) }
+}
+
+/// Whether and where the planes of two windows of each block meet between the middles of both.
+struct Crease<S: Simd> {
+    gap: Inclined<S>,
+    /// How far the first plane is above the second one in the middle of the first window.
+    here: Floats<S>,
+    /// The mask of the blocks that have one.
+    there: S::F,
+}
+
+impl<S: Simd> Crease<S> {
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn between(first: &Windows<S>, second: &Windows<S>, noise: Floats<S>) -> Self {
+        let gap = first.planes.minus(&second.planes);
+        let (here, there) = (gap.at(first.middle), gap.at(second.middle));
+        // SAFETY: as the caller's.
+        unsafe {
+            let least_gap = Floats::<S>(S::min(here.abs().0, there.abs().0));
+            let least = Floats::splat(CREASE_NOISE) * noise;
+            let are_two = S::lt(least.0, (least_gap * least_gap).0);
+            let meet = S::lt((here * there).0, S::splat(0.0));
+            Crease { gap, here, there: S::and(are_two, meet) }
+        }
+    }
+
+    /// The mask of the blocks in which a position is on the first plane's side.
+    #[inline(always)]
+    unsafe fn is_first_side(&self, at: [Floats<S>; 2]) -> S::F {
+        unsafe { S::and(self.there, S::lt(S::splat(0.0), (self.here * self.gap.at(at)).0)) }
+    }
+
+    #[inline(always)]
+    unsafe fn is_second_side(&self, at: [Floats<S>; 2]) -> S::F {
+        unsafe { S::and(self.there, S::lt((self.here * self.gap.at(at)).0, S::splat(0.0))) }
     }
 }
 
@@ -461,7 +634,7 @@ unsafe fn tolerance<S: Simd>(depth: S::F, options: &Options) -> Floats<S> {
 #[derive(Default)]
 struct Neighbours {
     blocks: usize,
-    /// Of the blocks' own pixels.
+    /// Of the blocks' own pixels that are concerned.
     depths: Vec<f32>,
     clean: Vec<f32>,
     /// Of those around them too.
@@ -490,7 +663,9 @@ impl Neighbours {
                 continue;
             }
             let pixels = y * cloud.width..(y + 1) * cloud.width;
-            let (row_depths, row_clean) = (&cloud.depths[pixels.clone()], &asked.clean[pixels]);
+            let (row_depths, row_clean) =
+                (&cloud.depths[pixels.clone()], &asked.clean[pixels.clone()]);
+            let row_concerned = &asked.concerned[pixels];
             for (to, depth) in inverse[1..].iter_mut().zip(row_depths) {
                 *to = inverse_depth(*depth);
             }
@@ -508,7 +683,7 @@ impl Neighbours {
                 let of_own = depths[to..].iter_mut().zip(&mut clean[to..]);
                 for ((depth, clean), block) in of_own.zip(blocks) {
                     let x = block * BLOCK + column;
-                    if x < cloud.width {
+                    if x < cloud.width && row_concerned[x] {
                         (*depth, *clean) = (row_depths[x], row_clean[x] as f32);
                     }
                 }
@@ -539,7 +714,7 @@ impl Neighbours {
         first: usize,
         [column, row]: [usize; 2],
         noisy: S::F,
-    ) -> Near<S> {
+    ) -> (Floats<S>, Near<S>) {
         // SAFETY: as the caller's; blocks are whole groups.
         unsafe {
             let zero = Floats::<S>::splat(0.0);
@@ -561,8 +736,9 @@ impl Neighbours {
                     points = points + Floats(S::and(there, S::splat(1.0)));
                 }
             }
-            let offset = [offset[0] / points, offset[1] / points];
-            Near { inverse_depth: sum / points, offset, points, own }
+            let [x, y] = [from_middle(column), from_middle(row)];
+            let at = [x + offset[0] / points, y + offset[1] / points];
+            (own, Near { inverse_depth: sum / points, at, points })
         }
     }
 }

@@ -167,11 +167,11 @@ pub(crate) fn even_windows(
     Ok(())
 }
 
-/// The block whose even window each pixel takes, if there is one.
+/// The block whose even window each pixel takes, where there is one; the others' choices stay.
 pub(crate) fn choices(
     isa: Isa,
     even: &EvenWindows,
-    choices: &mut [Option<u32>],
+    choices: &mut [u32],
     workers: &Workers,
 ) -> Result<(), Error> {
     let rows = choices.chunks_mut(BLOCK * even.cloud.width).enumerate();
@@ -525,7 +525,7 @@ impl Task for EvenTask<'_, '_> {
 /// The choices of the pixels of some rows of blocks.
 struct ChoicesTask<'a, 'c> {
     even: &'a EvenWindows<'a>,
-    rows: &'a mut dyn Iterator<Item = (usize, &'c mut [Option<u32>])>,
+    rows: &'a mut dyn Iterator<Item = (usize, &'c mut [u32])>,
 }
 
 impl Task for ChoicesTask<'_, '_> {
