@@ -175,26 +175,36 @@ impl SecondPass {
     /// options ask.
     pub fn estimate(&self, cloud: &Cloud, options: &Options, at: usize) -> Estimate {
         let first = self.estimates[at];
-        if !(asks(options) && self.concerned[at]) {
+        if !asks(options) {
             return first.into();
         }
-        let choice = Some(self.choices[at]).filter(|choice| *choice != NO_WINDOW);
-        let of_choice = choice.map(|block| self.second[block as usize].into());
-        let of_choice = of_choice.filter(|found: &Estimate| !found.normal[0].is_nan());
-        let around = || {
-            let pixel = (at % cloud.width, at / cloud.width);
-            let same = |depth: f32, difference: f32, distance: usize| {
-                !is_depth_change(depth, difference, distance.max(1), options)
-            };
-            let has_none = options.one_sided_windows && first[0].is_nan();
-            has_none.then(|| surroundings::plane_around(cloud, pixel, same)).flatten()
+        let choice = self.choices[at];
+        let estimate = if choice != NO_WINDOW { self.second[choice as usize] } else { first };
+        if !estimate[0].is_nan() {
+            let Estimate { normal, curvature } = estimate.into();
+            // What the first pass found is turned already.
+            let normal = turn_to_viewpoint(normal, cloud.points[at], options.viewpoint);
+            return Estimate { normal, curvature };
+        }
+        self.estimate_around(cloud, options, at)
+    }
+
+    /// The estimate of a pixel without a window in the second pass, or with one that has no normal.
+    fn estimate_around(&self, cloud: &Cloud, options: &Options, at: usize) -> Estimate {
+        let first = self.estimates[at];
+        if !first[0].is_nan() || !options.one_sided_windows || cloud.is_missing(at) {
+            return first.into();
+        }
+        let pixel = (at % cloud.width, at / cloud.width);
+        let same = |depth: f32, difference: f32, distance: usize| {
+            !is_depth_change(depth, difference, distance.max(1), options)
         };
-        let Some(Estimate { normal, curvature }) = of_choice.or_else(around) else {
+        let Some(found) = surroundings::plane_around(cloud, pixel, same) else {
             return first.into();
         };
-        let normal = turn_to_viewpoint(normal, cloud.points[at], options.viewpoint);
+        let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
         let has_curvature = options.method == Method::CovarianceMatrix;
-        Estimate { normal, curvature: if has_curvature { curvature } else { f32::NAN } }
+        Estimate { normal, curvature: if has_curvature { found.curvature } else { f32::NAN } }
     }
 }
 

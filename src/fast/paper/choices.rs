@@ -29,23 +29,22 @@ pub(super) unsafe fn rows<S: Groups>(
 ) -> Result<(), Error> {
     let Blocks { across, .. } = even.asked.blocks;
     let mut concerned = Vec::new();
-    let mut neighbours = Neighbours::default();
+    let mut image_rows = Rows::default();
     // SAFETY: as the caller's.
     let noise = unsafe { Floats::<S::Widest>::splat(0.0) };
     let mut found = Found { candidates: Vec::new(), number: 0, noise, exact: noise.0 };
-    let lanes = S::Widest::LANES;
     for (row, choices) in rows {
         let levels = &even.asked.levels[row * across..][..across];
         make_room(&mut concerned, across)?;
         concerned.extend((0..across).filter(|block| levels[*block] > 0));
-        neighbours.read(even, row, &concerned)?;
-        for (number, blocks) in concerned.chunks(lanes).enumerate() {
-            let group = Group { even, row, first: number * lanes, blocks };
+        image_rows.read(even, row)?;
+        for blocks in concerned.chunks(S::Widest::LANES) {
+            let group = Group { even, row, blocks };
             // SAFETY: as the caller's.
             unsafe {
                 group.candidates(&mut found)?;
                 found.weigh(even.asked.least_noise);
-                group.choose(&mut found, &neighbours, choices);
+                group.choose(&mut found, &image_rows.around(blocks), choices);
             }
         }
     }
@@ -56,8 +55,6 @@ pub(super) unsafe fn rows<S: Groups>(
 struct Group<'a> {
     even: &'a EvenWindows<'a>,
     row: usize,
-    /// The number of the first among the row's.
-    first: usize,
     /// Their columns.
     blocks: &'a [usize],
 }
@@ -438,15 +435,15 @@ impl Group<'_> {
     unsafe fn choose<S: Along>(
         &self,
         found: &mut Found<S>,
-        neighbours: &Neighbours,
+        around: &Around<S>,
         choices: &mut [u32],
     ) {
         let width = self.even.cloud.width;
         // SAFETY: as the caller's.
         unsafe {
-            let mut pixels = [self.pixels(found, neighbours, 0); BLOCK * BLOCK];
+            let mut pixels = [self.pixels(found, around, 0); BLOCK * BLOCK];
             for number in 1..BLOCK * BLOCK {
-                pixels[number] = self.pixels(found, neighbours, number);
+                pixels[number] = self.pixels(found, around, number);
             }
             let mut first = pixels[MIDDLE * BLOCK + MIDDLE];
             for other in &pixels {
@@ -505,31 +502,34 @@ impl Group<'_> {
     unsafe fn pixels<S: Along>(
         &self,
         found: &Found<S>,
-        neighbours: &Neighbours,
+        around: &Around<S>,
         number: usize,
     ) -> Pixels<S> {
         let place = [number % BLOCK, number / BLOCK];
         // SAFETY: as the caller's.
         unsafe {
-            let (depth, clean) = neighbours.own::<S>(self.first, place);
+            let depth = around.depths[place[1]][place[0]];
+            let clean = around.clean[place[1]][place[0]];
             let noisy = S::and_not(found.exact, S::lt(S::splat(0.0), clean));
-            let (inverse_depth, near) = neighbours.near::<S>(self.first, place, noisy);
             Pixels {
                 number: Floats::splat(number as f32),
                 at: [from_middle(place[0]), from_middle(place[1])],
                 there: S::eq(depth, depth),
-                inverse_depth,
+                inverse_depth: Floats(around.inverse_depths[place[1] + 1][place[0] + 1]),
                 tolerance: tolerance::<S>(depth, self.even.options),
-                near,
+                near: around.near(place, noisy),
             }
         }
     }
 }
 
 /// How far a column or row of a block is from its middle.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
 #[inline(always)]
-fn from_middle<S: Simd>(line: usize) -> Floats<S> {
-    // SAFETY: TODO
+unsafe fn from_middle<S: Simd>(line: usize) -> Floats<S> {
+    // SAFETY: as the caller's.
     unsafe { Floats::splat(line as f32 - MIDDLE as f32) }
 }
 
@@ -559,14 +559,24 @@ impl<S: Simd> Crease<S> {
         }
     }
 
-    /// The mask of the blocks in which a position is on the first plane's side.
+    /// The mask of the blocks that have a crease and a position on the first window's side of it: there the same plane is
+    /// in front as in the middle of that window.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn is_first_side(&self, at: [Floats<S>; 2]) -> S::F {
+        // SAFETY: as the caller's.
         unsafe { S::and(self.there, S::lt(S::splat(0.0), (self.here * self.gap.at(at)).0)) }
     }
 
+    /// As [`Crease::is_first_side`], of the second window.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn is_second_side(&self, at: [Floats<S>; 2]) -> S::F {
+        // SAFETY: as the caller's.
         unsafe { S::and(self.there, S::lt((self.here * self.gap.at(at)).0, S::splat(0.0))) }
     }
 }
@@ -629,105 +639,142 @@ unsafe fn tolerance<S: Simd>(depth: S::F, options: &Options) -> Floats<S> {
     }
 }
 
-/// Blocks of a row, and the pixels around them, pixel by pixel of a block: so many of each, block by block; NaN outside
-/// the image.
+/// Rows and columns of a block's pixels and those around it, and columns that are read of them.
+const AROUND: usize = BLOCK + 2;
+const READ: usize = AROUND.next_multiple_of(4);
+
+/// The rows of the image around a row of blocks.
 #[derive(Default)]
-struct Neighbours {
-    blocks: usize,
-    /// Of the blocks' own pixels that are concerned.
+struct Rows {
+    /// Elements of a row: a column before the image's, and room behind it for what is read of the last block.
+    length: usize,
+    /// `AROUND` rows; NaN outside the image.
+    inverse_depths: Vec<f32>,
+    /// `BLOCK` rows; NaN for the pixels that are not concerned.
     depths: Vec<f32>,
     clean: Vec<f32>,
-    /// Of those around them too.
-    inverse_depths: Vec<f32>,
-    /// A row of the image, with a column before it, and room behind it for the last block.
-    inverse: Vec<f32>,
 }
 
-/// Rows and columns of a block's pixels and those around it.
-const AROUND: usize = BLOCK + 2;
+/// The pixels of each block of a group, and those around them: rows of columns.
+struct Around<S: Simd> {
+    inverse_depths: [[S::F; AROUND]; AROUND],
+    depths: [[S::F; BLOCK]; BLOCK],
+    clean: [[S::F; BLOCK]; BLOCK],
+}
 
-impl Neighbours {
-    /// Becomes those of other blocks.
-    fn read(&mut self, even: &EvenWindows, row: usize, blocks: &[usize]) -> Result<(), Error> {
+impl Rows {
+    /// Becomes those around another row of blocks.
+    #[inline(always)]
+    fn read(&mut self, even: &EvenWindows, row: usize) -> Result<(), Error> {
         let &EvenWindows { cloud, asked, .. } = even;
-        let Neighbours { blocks: length, depths, clean, inverse_depths, inverse } = self;
-        *length = blocks.len().next_multiple_of(LANES);
-        for of_own in [&mut *depths, &mut *clean] {
-            refill(of_own, repeat_n(f32::NAN, BLOCK * BLOCK * *length))?;
+        let length = 1 + cloud.width + READ;
+        self.length = length;
+        refill(&mut self.inverse_depths, repeat_n(f32::NAN, AROUND * length))?;
+        for of_own in [&mut self.depths, &mut self.clean] {
+            refill(of_own, repeat_n(f32::NAN, BLOCK * length))?;
         }
-        refill(inverse_depths, repeat_n(f32::NAN, AROUND * AROUND * *length))?;
-        refill(inverse, repeat_n(f32::NAN, cloud.width + AROUND))?;
         for line in 0..AROUND {
             let y = (row * BLOCK + line).wrapping_sub(1);
             if y >= cloud.height {
                 continue;
             }
             let pixels = y * cloud.width..(y + 1) * cloud.width;
-            let (row_depths, row_clean) =
-                (&cloud.depths[pixels.clone()], &asked.clean[pixels.clone()]);
-            let row_concerned = &asked.concerned[pixels];
-            for (to, depth) in inverse[1..].iter_mut().zip(row_depths) {
+            let depths = &cloud.depths[pixels.clone()];
+            for (to, depth) in self.inverse_depths[line * length + 1..].iter_mut().zip(depths) {
                 *to = inverse_depth(*depth);
             }
-            for column in 0..AROUND {
-                let to = &mut inverse_depths[(line * AROUND + column) * *length..];
-                for (to, block) in to.iter_mut().zip(blocks) {
-                    *to = inverse[block * BLOCK + column];
+            if (1..=BLOCK).contains(&line) {
+                let first = (line - 1) * length;
+                let concerned = &asked.concerned[pixels.clone()];
+                let of_own = self.depths[first..].iter_mut().zip(depths.iter().zip(concerned));
+                for (to, (depth, concerned)) in of_own {
+                    *to = if *concerned { *depth } else { f32::NAN };
                 }
-            }
-            if !(1..=BLOCK).contains(&line) {
-                continue;
-            }
-            for column in 0..BLOCK {
-                let to = ((line - 1) * BLOCK + column) * *length;
-                let of_own = depths[to..].iter_mut().zip(&mut clean[to..]);
-                for ((depth, clean), block) in of_own.zip(blocks) {
-                    let x = block * BLOCK + column;
-                    if x < cloud.width && row_concerned[x] {
-                        (*depth, *clean) = (row_depths[x], row_clean[x] as f32);
-                    }
+                for (to, clean) in self.clean[first..].iter_mut().zip(&asked.clean[pixels]) {
+                    *to = *clean as f32;
                 }
             }
         }
         Ok(())
     }
 
-    /// The depths and the clean radii of the pixels in a column and row of the blocks from the `first` on.
+    /// The pixels of some blocks, at most as many as there are lanes; lanes without one have no depth.
     ///
     /// # Safety
-    /// As [`Neighbours::near`].
+    /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn own<S: Simd>(&self, first: usize, [column, row]: [usize; 2]) -> (S::F, S::F) {
-        let at = (row * BLOCK + column) * self.blocks + first;
-        // SAFETY: as the caller's; blocks are whole groups.
-        unsafe { (S::load(self.depths[at..].as_ptr()), S::load(self.clean[at..].as_ptr())) }
+    unsafe fn around<S: Along>(&self, blocks: &[usize]) -> Around<S> {
+        let mut columns = [0; LANES];
+        for (to, block) in columns.iter_mut().zip(blocks) {
+            *to = block * BLOCK;
+        }
+        assert!(columns.iter().all(|column| column + READ <= self.length));
+        // SAFETY: as the caller's; the rows have so many elements from every column on.
+        unsafe {
+            let there = S::mask((1 << blocks.len()) - 1);
+            let none = S::splat(f32::NAN);
+            let mut around = Around {
+                inverse_depths: [[none; AROUND]; AROUND],
+                depths: [[none; BLOCK]; BLOCK],
+                clean: [[none; BLOCK]; BLOCK],
+            };
+            for line in 0..AROUND {
+                let row = self.inverse_depths[line * self.length..].as_ptr();
+                let first = columns_from::<S>(row, &columns);
+                let rest = columns_from::<S>(row.add(4), &columns);
+                for column in 0..AROUND {
+                    around.inverse_depths[line][column] =
+                        if column < 4 { first[column] } else { rest[column - 4] };
+                }
+            }
+            for line in 0..BLOCK {
+                let first = line * self.length;
+                let depths = columns_from::<S>(self.depths[first..].as_ptr(), &columns);
+                let clean = columns_from::<S>(self.clean[first..].as_ptr(), &columns);
+                for column in 0..BLOCK {
+                    around.depths[line][column] = S::select(there, depths[column], none);
+                    around.clean[line][column] = clean[column];
+                }
+            }
+            around
+        }
     }
+}
 
-    /// Of the points next to those in a column and row of the blocks from the `first` on; around pixels not in the mask
-    /// `noisy`, of these alone.
+/// Four columns of a row, from one on for each lane.
+///
+/// # Safety
+/// The processor has the instruction set of `S`; the row has them.
+#[inline(always)]
+unsafe fn columns_from<S: Along>(row: *const f32, columns: &[usize; LANES]) -> [S::F; 4] {
+    // SAFETY: as the caller's.
+    unsafe {
+        let at = |lane: usize| row.add(columns[lane]);
+        S::transpose_fours([
+            S::load_fours(|four| at(4 * four)),
+            S::load_fours(|four| at(4 * four + 1)),
+            S::load_fours(|four| at(4 * four + 2)),
+            S::load_fours(|four| at(4 * four + 3)),
+        ])
+    }
+}
+
+impl<S: Simd> Around<S> {
+    /// Of the points next to the blocks' pixels in a column and row; around pixels not in the mask `noisy`, of these alone.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`; the first is one of the blocks, and starts a group.
+    /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn near<S: Simd>(
-        &self,
-        first: usize,
-        [column, row]: [usize; 2],
-        noisy: S::F,
-    ) -> (Floats<S>, Near<S>) {
-        // SAFETY: as the caller's; blocks are whole groups.
+    unsafe fn near(&self, [column, row]: [usize; 2], noisy: S::F) -> Near<S> {
+        // SAFETY: as the caller's.
         unsafe {
             let zero = Floats::<S>::splat(0.0);
             let (mut sum, mut offset, mut points) = (zero, [zero; 2], zero);
-            let mut own = zero;
             for (line, dy) in (row..row + 3).zip([-1.0, 0.0, 1.0]) {
                 for (column, dx) in (column..column + 3).zip([-1.0, 0.0, 1.0]) {
-                    let at = (line * AROUND + column) * self.blocks + first;
-                    let inverse = S::load(self.inverse_depths[at..].as_ptr());
+                    let inverse = self.inverse_depths[line][column];
                     let mut there = S::eq(inverse, inverse);
-                    if dx == 0.0 && dy == 0.0 {
-                        own = Floats(inverse);
-                    } else {
+                    if dx != 0.0 || dy != 0.0 {
                         there = S::and(there, noisy);
                     }
                     sum = sum + Floats(S::and(there, inverse));
@@ -736,9 +783,9 @@ impl Neighbours {
                     points = points + Floats(S::and(there, S::splat(1.0)));
                 }
             }
-            let [x, y] = [from_middle(column), from_middle(row)];
+            let [x, y] = [from_middle::<S>(column), from_middle::<S>(row)];
             let at = [x + offset[0] / points, y + offset[1] / points];
-            (own, Near { inverse_depth: sum / points, at, points })
+            Near { inverse_depth: sum / points, at, points }
         }
     }
 }
