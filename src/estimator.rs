@@ -144,9 +144,15 @@ impl Estimator {
         let width = points.width();
         if self.options.is_beyond_pcl() {
             self.second_pass(points)?;
-            let Estimator { options, scratch, cloud, second_pass, .. } = &*self;
-            let estimate = |pixel| second_pass.estimate(cloud, options, pixel);
-            write(normals, indices, width, scratch.workers(), estimate);
+            let is_plain = self.is_plain(points);
+            let Estimator { options, isa, scratch, cloud, second_pass } = &*self;
+            let workers = scratch.workers();
+            if is_plain || indices.is_some() {
+                let estimate = |pixel| second_pass.estimate(cloud, options, pixel);
+                write(normals, indices, width, workers, estimate);
+            } else {
+                fast::paper::write_found(*isa, second_pass, cloud, options, normals, workers);
+            }
         } else {
             let plain = Plain::new(points, &self.options)?;
             let estimate = |pixel: usize| plain.estimate(pixel % width, pixel / width);
@@ -274,7 +280,11 @@ impl Estimator {
         let is_plain = self.is_plain(points);
         let Estimator { options, isa, scratch, cloud, second_pass } = self;
         scratch.prepare(options.threads)?;
-        cloud.read(points, options, scratch.workers())?;
+        if is_plain {
+            cloud.read(points, options)?;
+        } else {
+            fast::paper::read_cloud(*isa, points, options, cloud, scratch.workers())?;
+        }
         // To PCL's windows, a point that misses a coordinate is missing whole.
         let is_pcl = options.semantics == Semantics::Pcl;
         let cleaned = is_pcl.then(|| packed(&cloud.points, cloud.width, cloud.height));

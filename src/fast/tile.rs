@@ -689,7 +689,7 @@ impl Estimates {
         self.curvature[lane] = estimate.curvature;
     }
 
-    /// What was found for `lanes`, turned to the viewpoint: `orientation::turn_to_viewpoint`.
+    /// What was found for `lanes`, turned to the viewpoint.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
@@ -703,19 +703,13 @@ impl Estimates {
         const { assert!(S::LANES == LANES) };
         // SAFETY: as the caller's; the arrays hold so many lanes each.
         unsafe {
-            let [x, y, z] = viewpoint;
-            let viewpoint = [Floats::<S>::splat(x), Floats::splat(y), Floats::splat(z)];
-            let [x, y, z] = point;
-            let to_viewpoint = [viewpoint[0] - x, viewpoint[1] - y, viewpoint[2] - z];
-            let cosine = dot(to_viewpoint, normal);
-            let flip = S::and(S::lt(cosine.0, S::splat(0.0)), S::splat(-0.0));
+            let normal = turned(normal, point, viewpoint);
             let mask = S::mask(lanes);
             let none = S::splat(f32::NAN);
             let mut estimates = std::mem::MaybeUninit::<Self>::uninit();
             let to = estimates.as_mut_ptr().cast::<f32>();
             for c in 0..3 {
-                let normal = S::select(mask, S::xor(normal[c].0, flip), none);
-                S::store(to.add(c * LANES), normal);
+                S::store(to.add(c * LANES), S::select(mask, normal[c].0, none));
             }
             S::store(to.add(3 * LANES), S::select(mask, curvature.0, none));
             estimates.assume_init()
@@ -724,3 +718,26 @@ impl Estimates {
 }
 
 const _: () = assert!(MARGIN >= GROUP);
+
+/// Normals turned to the viewpoint: `orientation::turn_to_viewpoint`.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+pub(crate) unsafe fn turned<S: Simd>(
+    mut normal: [Floats<S>; 3],
+    [x, y, z]: [Floats<S>; 3],
+    viewpoint: [f32; 3],
+) -> [Floats<S>; 3] {
+    // SAFETY: as the caller's.
+    unsafe {
+        let [vx, vy, vz] = viewpoint;
+        let viewpoint = [Floats::<S>::splat(vx), Floats::splat(vy), Floats::splat(vz)];
+        let cosine = dot([viewpoint[0] - x, viewpoint[1] - y, viewpoint[2] - z], normal);
+        let flip = S::and(S::lt(cosine.0, S::splat(0.0)), S::splat(-0.0));
+        for axis in &mut normal {
+            axis.0 = S::xor(axis.0, flip);
+        }
+        normal
+    }
+}

@@ -6,7 +6,6 @@ use crate::cloud::Points;
 use crate::memory::{bytes, resize};
 use crate::methods::is_finite;
 use crate::options::{Depth, Options, Semantics};
-use crate::threads::Workers;
 
 /// An organized cloud, row by row. A missing point has NaN coordinates and NaN depth.
 #[derive(Debug, Default)]
@@ -20,32 +19,37 @@ pub(crate) struct Cloud {
 impl Cloud {
     pub fn new(points: &Points, options: &Options) -> Result<Self, Error> {
         let mut cloud = Cloud::default();
-        cloud.read(points, options, &Workers::default())?;
+        cloud.read(points, options)?;
         Ok(cloud)
     }
 
     /// Becomes another cloud.
-    pub fn read(
-        &mut self,
-        points: &Points,
-        options: &Options,
-        workers: &Workers,
-    ) -> Result<(), Error> {
-        let (width, height) = (points.width(), points.height());
-        (self.width, self.height) = (width, height);
+    pub fn read(&mut self, points: &Points, options: &Options) -> Result<(), Error> {
+        self.resize(points)?;
+        let width = self.width;
         let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
-        resize(&mut self.points, width * height, [f32::NAN; 3])?;
-        resize(&mut self.depths, width * height, f32::NAN)?;
-        let range = options.semantics == Semantics::Paper && options.paper.depth == Depth::Range;
+        let range = Self::has_range(options);
         let depth = |[x, y, z]: [f32; 3]| if range { (x * x + y * y + z * z).sqrt() } else { z };
         let rows = self.points.chunks_mut(width).zip(self.depths.chunks_mut(width)).enumerate();
-        workers.each(rows, |(y, (points, depths))| {
+        for (y, (points, depths)) in rows {
             for (x, (to, of_to)) in points.iter_mut().zip(depths).enumerate() {
                 *to = cleaned.at(x, y);
                 *of_to = depth(*to);
             }
-        });
+        }
         Ok(())
+    }
+
+    /// Takes the size of a cloud.
+    pub fn resize(&mut self, points: &Points) -> Result<(), Error> {
+        (self.width, self.height) = (points.width(), points.height());
+        resize(&mut self.points, self.width * self.height, [f32::NAN; 3])?;
+        resize(&mut self.depths, self.width * self.height, f32::NAN)
+    }
+
+    /// Whether depths are distances from the origin, not z.
+    pub fn has_range(options: &Options) -> bool {
+        options.semantics == Semantics::Paper && options.paper.depth == Depth::Range
     }
 
     /// Bytes held.

@@ -100,7 +100,7 @@ impl SecondPass {
     ) -> Result<(), Error> {
         engine.windows(&mut self.sizes, &mut self.estimates)?;
         if !asks(options) {
-            return Ok(());
+            return refill(&mut self.choices, repeat_n(NO_WINDOW, self.estimates.len()));
         }
         let blocks = Blocks::of(cloud.width, cloud.height);
         self.concern(cloud, &blocks, options, engine.workers())?;
@@ -206,22 +206,23 @@ impl SecondPass {
     /// The estimate of a pixel, turned to the viewpoint: near depth changes and near creases from even windows, as the
     /// options ask.
     pub fn estimate(&self, cloud: &Cloud, options: &Options, at: usize) -> Estimate {
-        let first = self.estimates[at];
-        if !asks(options) {
-            return first.into();
+        let found: Estimate = (*self.found(at)).into();
+        if found.normal[0].is_nan() {
+            return self.estimate_around(cloud, options, at);
         }
-        let choice = self.choices[at];
-        let estimate = if choice != NO_WINDOW { self.second[choice as usize] } else { first };
-        if !estimate[0].is_nan() {
-            let Estimate { normal, curvature } = estimate.into();
-            // What the first pass found is turned already.
-            let normal = turn_to_viewpoint(normal, cloud.points[at], options.viewpoint);
-            return Estimate { normal, curvature };
-        }
-        self.estimate_around(cloud, options, at)
+        // What the first pass found is turned already.
+        let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
+        Estimate { normal, ..found }
     }
 
-    /// The estimate of a pixel without a window in the second pass, or with one that has no normal.
+    /// What the window that a pixel takes gave, or without one the first pass.
+    #[inline(always)]
+    pub fn found(&self, at: usize) -> &[f32; 4] {
+        let choice = self.choices[at];
+        if choice == NO_WINDOW { &self.estimates[at] } else { &self.second[choice as usize] }
+    }
+
+    /// The estimate of a pixel whose window has no normal.
     fn estimate_around(&self, cloud: &Cloud, options: &Options, at: usize) -> Estimate {
         let first = self.estimates[at];
         if !first[0].is_nan() || !options.one_sided_windows || cloud.is_missing(at) {

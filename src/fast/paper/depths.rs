@@ -1,4 +1,4 @@
-//! The depths of a row of points, missing ones NaN.
+//! The depths of a row of points, and these themselves, missing ones NaN.
 
 use crate::cloud::Points;
 use crate::fast::lanes::{LANES, Lanes};
@@ -29,20 +29,11 @@ pub(crate) unsafe fn read<S: Along>(
     // SAFETY: as the caller's; all lanes lie inside the depths.
     unsafe {
         let none = S::splat(f32::NAN);
-        let zero = S::splat(0.0);
-        let (mut nearest, mut deepest) = (S::splat(f32::INFINITY), zero);
+        let (mut nearest, mut deepest) = (S::splat(f32::INFINITY), S::splat(0.0));
         for x in (0..width).step_by(S::LANES) {
             let [px, py, pz] = points.lanes::<S>(x);
-            let mut there = S::and(S::and(S::finite(px), S::finite(py)), S::finite(pz));
-            if options.zero_is_missing {
-                let origin = S::and(S::and(S::eq(px, zero), S::eq(py, zero)), S::eq(pz, zero));
-                there = S::and_not(origin, there);
-            }
-            let depth = if range {
-                S::sqrt(S::add(S::add(S::mul(px, px), S::mul(py, py)), S::mul(pz, pz)))
-            } else {
-                pz
-            };
+            let there = there::<S>([px, py, pz], options);
+            let depth = depth::<S>([px, py, pz], range);
             S::store(depths.as_mut_ptr().add(x), S::select(there, depth, none));
             let magnitude = S::abs(depth);
             nearest = S::min(S::select(there, magnitude, nearest), nearest);
@@ -54,5 +45,80 @@ pub(crate) unsafe fn read<S: Along>(
             S::store(to.0.as_mut_ptr(), lane);
         }
         [lanes[0].least(), lanes[1].largest()]
+    }
+}
+
+/// Reads a row of points and their depths: of the paper's range where `range` says so, else z.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+pub(crate) unsafe fn read_points<S: Along>(
+    points: &Points,
+    options: &Options,
+    y: usize,
+    range: bool,
+    to: &mut [[f32; 3]],
+    depths: &mut [f32],
+) {
+    let width = points.width();
+    let row = points.row(y, 0..width, false);
+    let (to, depths) = (&mut to[..width], &mut depths[..width]);
+    for x in (0..width).step_by(S::LANES) {
+        // SAFETY: as the caller's; all of the lanes, or as many as there is room for, are stored.
+        unsafe {
+            let point = row.lanes::<S>(x);
+            let (none, there) = (S::splat(f32::NAN), there::<S>(point, options));
+            let depth = S::select(there, depth::<S>(point, range), none);
+            let [x_, y_, z_] = point;
+            let fields = [
+                S::select(there, x_, none),
+                S::select(there, y_, none),
+                S::select(there, z_, none),
+                depth,
+            ];
+            if x + S::LANES <= width {
+                S::store_points(fields, 0, to[x..].as_mut_ptr().cast(), size_of::<[f32; 3]>());
+                S::store(depths[x..].as_mut_ptr(), depth);
+            } else {
+                let mut last = [[0.0; LANES]; 4];
+                for (last, field) in last.iter_mut().zip(fields) {
+                    S::store(last.as_mut_ptr(), field);
+                }
+                let [xs, ys, zs, of_last] = last;
+                for (lane, (to, depth)) in to[x..].iter_mut().zip(&mut depths[x..]).enumerate() {
+                    (*to, *depth) = ([xs[lane], ys[lane], zs[lane]], of_last[lane]);
+                }
+            }
+        }
+    }
+}
+
+/// The mask of the points that are not missing.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn there<S: Along>([x, y, z]: [S::F; 3], options: &Options) -> S::F {
+    // SAFETY: as the caller's.
+    unsafe {
+        let there = S::and(S::and(S::finite(x), S::finite(y)), S::finite(z));
+        if !options.zero_is_missing {
+            return there;
+        }
+        let zero = S::splat(0.0);
+        S::and_not(S::and(S::and(S::eq(x, zero), S::eq(y, zero)), S::eq(z, zero)), there)
+    }
+}
+
+/// The distances from the origin, or z.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn depth<S: Along>([x, y, z]: [S::F; 3], range: bool) -> S::F {
+    // SAFETY: as the caller's.
+    unsafe {
+        if range { S::sqrt(S::add(S::add(S::mul(x, x), S::mul(y, y)), S::mul(z, z))) } else { z }
     }
 }

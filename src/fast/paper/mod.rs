@@ -5,6 +5,7 @@
 mod choices;
 mod depths;
 mod even_windows;
+mod found;
 mod integrals;
 mod layers;
 mod methods;
@@ -17,6 +18,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use depths::row_length;
 use even_windows::EvenTile;
+use found::FoundRow;
 use integrals::{Rings, reached, rows_of_rings};
 use layers::{Layer, Waiting};
 use methods::{CovarianceMatrix, Gradients, MOMENTS, SmoothedDepthChanges};
@@ -32,7 +34,7 @@ use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::memory::{bytes, make_room, resize};
 use crate::options::{DistanceMetric, Method, Options};
-use crate::paper::{Asked, BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, PaperMaps};
+use crate::paper::{Asked, BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, PaperMaps, SecondPass};
 use crate::simd::{GROUP, Groups};
 use crate::threads::Workers;
 
@@ -132,6 +134,41 @@ pub(crate) fn compute_of_blocks(
     job.depths(scratch)?;
     let largest = job.given_radii(scratch, radii)?;
     job.tiles(scratch, None, normals, largest, BLOCK)
+}
+
+/// Makes a cloud that of these points, as [`Cloud::read`].
+pub(crate) fn read_cloud(
+    isa: Isa,
+    points: &Points,
+    options: &Options,
+    cloud: &mut Cloud,
+    workers: &Workers,
+) -> Result<(), Error> {
+    cloud.resize(points)?;
+    let range = Cloud::has_range(options);
+    let width = points.width();
+    let rows = cloud.points.chunks_mut(width).zip(cloud.depths.chunks_mut(width)).enumerate();
+    workers.each(rows, |(y, (to, depths))| {
+        // SAFETY: the processor has the instruction set.
+        unsafe { paths::run(isa, PointsTask { points, options, y, range, to, depths }) };
+    });
+    Ok(())
+}
+
+/// Writes what both passes found for all pixels.
+pub(crate) fn write_found(
+    isa: Isa,
+    second_pass: &SecondPass,
+    cloud: &Cloud,
+    options: &Options,
+    normals: &Normals,
+    workers: &Workers,
+) {
+    workers.for_each(cloud.height, |_, y| {
+        let row = FoundRow { cloud, options, second_pass, normals, y };
+        // SAFETY: the processor has the instruction set, and every row falls to one thread.
+        unsafe { paths::run(isa, FoundTask { row }) };
+    });
 }
 
 /// The even windows of the needed blocks, by the workers there are.
@@ -446,6 +483,42 @@ impl Task for DepthsTask<'_> {
         let DepthsTask { points, options, y, whole_points, depths } = self;
         // SAFETY: as the caller's.
         unsafe { depths::read::<S::Widest>(points, options, y, whole_points, depths) }
+    }
+}
+
+/// A row of points and depths.
+struct PointsTask<'a> {
+    points: &'a Points<'a>,
+    options: &'a Options,
+    y: usize,
+    range: bool,
+    to: &'a mut [[f32; 3]],
+    depths: &'a mut [f32],
+}
+
+impl Task for PointsTask<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Groups>(self) {
+        let PointsTask { points, options, y, range, to, depths } = self;
+        // SAFETY: as the caller's.
+        unsafe { depths::read_points::<S::Widest>(points, options, y, range, to, depths) };
+    }
+}
+
+/// A row of what both passes found; no one else writes it.
+struct FoundTask<'a> {
+    row: FoundRow<'a>,
+}
+
+impl Task for FoundTask<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Groups>(self) {
+        // SAFETY: as the caller's.
+        unsafe { self.row.write::<S::Widest>() };
     }
 }
 
