@@ -143,7 +143,7 @@ impl Estimator {
         }
         let width = points.width();
         if self.options.is_beyond_pcl() {
-            self.second_pass(points)?;
+            self.second_pass(points, points.has_whole_points(normals))?;
             let is_plain = self.is_plain(points);
             let Estimator { options, isa, scratch, cloud, second_pass } = &*self;
             let workers = scratch.workers();
@@ -276,14 +276,16 @@ impl Estimator {
     }
 
     /// Computes what the estimates are made from where PCL's windows and sums alone are not what is asked for.
-    fn second_pass(&mut self, points: &Points) -> Result<(), Error> {
+    /// `whole_points` as [`Points::has_whole_points`] says.
+    fn second_pass(&mut self, points: &Points, whole_points: bool) -> Result<(), Error> {
         let is_plain = self.is_plain(points);
         let Estimator { options, isa, scratch, cloud, second_pass } = self;
         scratch.prepare(options.threads)?;
         if is_plain {
             cloud.read(points, options)?;
         } else {
-            fast::paper::read_cloud(*isa, points, options, cloud, scratch.workers())?;
+            let workers = scratch.workers();
+            fast::paper::read_cloud(*isa, points, whole_points, options, cloud, workers)?;
         }
         // To PCL's windows, a point that misses a coordinate is missing whole.
         let is_pcl = options.semantics == Semantics::Pcl;

@@ -103,9 +103,7 @@ impl DepthChanges {
         };
         for (axis, changes) in [&mut self.right, &mut self.below].into_iter().enumerate() {
             workers.each(changes.chunks_mut(width).enumerate(), |(y, row)| {
-                for (x, change) in row.iter_mut().enumerate().filter(|(_, change)| **change) {
-                    *change = !is_explained(axis, y * width + x);
-                }
+                for_each_change(row, |x, change| *change = !is_explained(axis, y * width + x));
             });
         }
         self
@@ -113,8 +111,8 @@ impl DepthChanges {
 
     /// The largest radius around every pixel, row by row, of a window in which no two neighbours are a depth change
     /// apart; more than any image has if there is no change.
-    pub fn clean_radii(&self) -> Result<Vec<u32>, Error> {
-        let Self { width, height, .. } = *self;
+    pub fn clean_radii(self) -> Result<Vec<u32>, Error> {
+        let Self { width, height, mut right, mut below } = self;
         // The pixels that have a change among those next to them: the radius is the chessboard distance from them.
         let mut spoilt = table(repeat_n(false, width * height))?;
         let mut spoil = |columns: Range<usize>, rows: Range<usize>| {
@@ -123,17 +121,26 @@ impl DepthChanges {
             }
         };
         let around = |at: usize, size: usize| at.saturating_sub(1)..(at + 2).min(size);
-        let rows = self.right.chunks(width).zip(self.below.chunks(width)).enumerate();
+        let rows = right.chunks_mut(width).zip(below.chunks_mut(width)).enumerate();
         for (y, (right, below)) in rows {
-            for x in 0..width {
-                if right[x] {
-                    spoil(x..x + 2, around(y, height));
-                }
-                if below[x] {
-                    spoil(around(x, width), y..y + 2);
-                }
-            }
+            for_each_change(right, |x, _| spoil(x..x + 2, around(y, height)));
+            for_each_change(below, |x, _| spoil(around(x, width), y..y + 2));
         }
         least_steps(&spoilt, width, height, 1, 1)
+    }
+}
+
+/// Calls `visit` with the columns of a row's changes, and these. They are few: most of the row is looked at by sixteens.
+fn for_each_change(row: &mut [bool], mut visit: impl FnMut(usize, &mut bool)) {
+    const TOGETHER: usize = 16;
+    let (all, rest) = row.as_chunks_mut::<TOGETHER>();
+    let start_of_rest = all.len() * TOGETHER;
+    let all = all.iter_mut().map(|some| some.as_mut_slice());
+    let parts = all.zip((0..).step_by(TOGETHER)).chain([(rest, start_of_rest)]);
+    for (part, first) in parts {
+        if part.iter().fold(false, |any, change| any | change) {
+            let changes = part.iter_mut().zip(first..).filter(|(change, _)| **change);
+            changes.for_each(|(change, x)| visit(x, change));
+        }
     }
 }

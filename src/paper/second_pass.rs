@@ -1,6 +1,6 @@
 //! The second pass: normals near depth changes and near creases, from even windows.
 
-use std::iter::{once, repeat_n};
+use std::iter::repeat_n;
 use std::ops::Range;
 
 use super::blocks::{BLOCK, Blocks, middle};
@@ -143,12 +143,12 @@ impl SecondPass {
         let (estimates, sizes, normals) = (&*estimates, &*sizes, &*normals);
         let has_window = |at: usize| sizes[at] > 0 && !cloud.is_missing(at);
         let is_near_crease = |column: usize, row: usize| {
+            let has_window = |(x, y): &(usize, usize)| has_window(cloud.index(*x, *y));
             let at_middle = middle(column * BLOCK, BLOCK, cloud.width);
-            let pixel = (at_middle, middle(row * BLOCK, BLOCK, cloud.height));
+            let pixel = Some((at_middle, middle(row * BLOCK, BLOCK, cloud.height)));
             let place = |at: usize| (at % cloud.width, at / cloud.width);
-            let others = blocks.pixels((column, row)).into_iter().map(place);
-            let mut pixels = once(pixel).chain(others);
-            let with_window = pixels.find(|(x, y)| has_window(cloud.index(*x, *y)));
+            let other = || blocks.pixels((column, row)).into_iter().map(place).find(has_window);
+            let with_window = pixel.filter(has_window).or_else(other);
             with_window.is_some_and(|pixel| {
                 let size = sizes[cloud.index(pixel.0, pixel.1)];
                 normals.vary_in(&window_of_size(cloud, options, pixel, size))

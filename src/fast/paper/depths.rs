@@ -1,6 +1,6 @@
 //! The depths of a row of points, and these themselves, missing ones NaN.
 
-use crate::cloud::Points;
+use crate::cloud::{PointRow, Points};
 use crate::fast::lanes::{LANES, Lanes};
 use crate::options::{Depth, Options};
 use crate::simd::Along;
@@ -48,35 +48,30 @@ pub(crate) unsafe fn read<S: Along>(
     }
 }
 
-/// Reads a row of points and their depths: of the paper's range where `range` says so, else z.
+/// Reads a row of points and their depths, distances from the origin where `range` says so.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
 pub(crate) unsafe fn read_points<S: Along>(
-    points: &Points,
+    row: &PointRow,
     options: &Options,
-    y: usize,
     range: bool,
     to: &mut [[f32; 3]],
     depths: &mut [f32],
 ) {
-    let width = points.width();
-    let row = points.row(y, 0..width, false);
-    let (to, depths) = (&mut to[..width], &mut depths[..width]);
+    let width = to.len();
+    let depths = &mut depths[..width];
     for x in (0..width).step_by(S::LANES) {
         // SAFETY: as the caller's; all of the lanes, or as many as there is room for, are stored.
         unsafe {
             let point = row.lanes::<S>(x);
             let (none, there) = (S::splat(f32::NAN), there::<S>(point, options));
             let depth = S::select(there, depth::<S>(point, range), none);
-            let [x_, y_, z_] = point;
-            let fields = [
-                S::select(there, x_, none),
-                S::select(there, y_, none),
-                S::select(there, z_, none),
-                depth,
-            ];
+            let mut fields = [depth; 4];
+            for c in 0..3 {
+                fields[c] = S::select(there, point[c], none);
+            }
             if x + S::LANES <= width {
                 S::store_points(fields, 0, to[x..].as_mut_ptr().cast(), size_of::<[f32; 3]>());
                 S::store(depths[x..].as_mut_ptr(), depth);

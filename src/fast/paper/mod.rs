@@ -30,7 +30,7 @@ use super::paths::{self, Task};
 use super::sink::Sink;
 use super::{Parts, lock};
 use crate::Error;
-use crate::cloud::{Normals, Points};
+use crate::cloud::{Normals, PointRow, Points};
 use crate::isa::Isa;
 use crate::memory::{bytes, make_room, resize};
 use crate::options::{DistanceMetric, Method, Options};
@@ -136,10 +136,11 @@ pub(crate) fn compute_of_blocks(
     job.tiles(scratch, None, normals, largest, BLOCK)
 }
 
-/// Makes a cloud that of these points, as [`Cloud::read`].
+/// Makes a cloud that of these points, as [`Cloud::read`]. `whole_points` as [`Points::has_whole_points`] says.
 pub(crate) fn read_cloud(
     isa: Isa,
     points: &Points,
+    whole_points: bool,
     options: &Options,
     cloud: &mut Cloud,
     workers: &Workers,
@@ -149,8 +150,9 @@ pub(crate) fn read_cloud(
     let width = points.width();
     let rows = cloud.points.chunks_mut(width).zip(cloud.depths.chunks_mut(width)).enumerate();
     workers.each(rows, |(y, (to, depths))| {
+        let row = points.row(y, 0..width, whole_points);
         // SAFETY: the processor has the instruction set.
-        unsafe { paths::run(isa, PointsTask { points, options, y, range, to, depths }) };
+        unsafe { paths::run(isa, PointsTask { row, options, range, to, depths }) };
     });
     Ok(())
 }
@@ -488,9 +490,8 @@ impl Task for DepthsTask<'_> {
 
 /// A row of points and depths.
 struct PointsTask<'a> {
-    points: &'a Points<'a>,
+    row: PointRow<'a>,
     options: &'a Options,
-    y: usize,
     range: bool,
     to: &'a mut [[f32; 3]],
     depths: &'a mut [f32],
@@ -501,9 +502,9 @@ impl Task for PointsTask<'_> {
 
     #[inline(always)]
     unsafe fn run<S: Groups>(self) {
-        let PointsTask { points, options, y, range, to, depths } = self;
+        let PointsTask { row, options, range, to, depths } = self;
         // SAFETY: as the caller's.
-        unsafe { depths::read_points::<S::Widest>(points, options, y, range, to, depths) };
+        unsafe { depths::read_points::<S::Widest>(&row, options, range, to, depths) };
     }
 }
 
