@@ -19,6 +19,9 @@ use crate::Error;
 use crate::memory::table;
 use crate::threads::Workers;
 
+/// More than any window's radius. (Signed: every processor has the least of eight.)
+const LARGEST_CLEAN: i16 = i16::MAX / 2;
+
 /// Where there are depth changes, row by row.
 pub(crate) struct DepthChanges {
     width: usize,
@@ -110,8 +113,8 @@ impl DepthChanges {
     }
 
     /// The largest radius around every pixel, row by row, of a window in which no two neighbours are a depth change
-    /// apart; more than any image has if there is no change.
-    pub fn clean_radii(self) -> Result<Vec<u32>, Error> {
+    /// apart; at most `LARGEST_CLEAN`, as where there is no change.
+    pub fn clean_radii(self) -> Result<Vec<i16>, Error> {
         let Self { width, height, mut right, mut below } = self;
         // The pixels that have a change among those next to them: the radius is the chessboard distance from them.
         let mut spoilt = table(repeat_n(false, width * height))?;
@@ -126,7 +129,7 @@ impl DepthChanges {
             for_each_change(right, |x, _| spoil(x..x + 2, around(y, height)));
             for_each_change(below, |x, _| spoil(around(x, width), y..y + 2));
         }
-        least_steps(&spoilt, width, height, 1, 1)
+        least_steps(&spoilt, width, height, LARGEST_CLEAN, 1, 1)
     }
 }
 

@@ -1,6 +1,7 @@
 //! Step 2: the distance transform map (the paper's T): how far the nearest depth change is, in pixels.
 
 use std::iter::repeat_n;
+use std::ops::Add;
 
 use crate::Error;
 use crate::memory::table;
@@ -73,40 +74,35 @@ fn euclidean(changes: &[bool], width: usize, height: usize) -> Result<Vec<f32>, 
 fn chamfer(changes: &[bool], width: usize, height: usize) -> Result<Vec<f32>, Error> {
     const STRAIGHT: u32 = 3;
     const DIAGONAL: u32 = 4;
+    const FAR: u32 = u32::MAX / 2;
     let pixels = |value: u32| {
         if value >= FAR { f32::INFINITY } else { value as f32 / STRAIGHT as f32 }
     };
-    table(least_steps(changes, width, height, STRAIGHT, DIAGONAL)?.into_iter().map(pixels))
+    table(least_steps(changes, width, height, FAR, STRAIGHT, DIAGONAL)?.into_iter().map(pixels))
 }
 
-/// What [`least_steps`] gives where there is no pixel to come from, or more.
-const FAR: u32 = u32::MAX / 2;
-
 #[inline(always)]
-fn step(to: &mut u32, from: u32, weight: u32) {
+fn step<T: Copy + Ord + Add<Output = T>>(to: &mut T, from: T, weight: T) {
     *to = (*to).min(from + weight);
 }
 
-/// The steps along a row, in the order of its pixels.
-#[inline(always)]
-fn along<'a>(row: impl Iterator<Item = &'a mut u32>, straight: u32) {
-    row.fold(FAR, |before, to| {
-        step(to, before, straight);
-        *to
-    });
-}
-
 /// The least weight of the steps along rows and columns and along diagonals that lead to every pixel from one of the
-/// `starts`, in two passes.
-pub(crate) fn least_steps(
+/// `starts`, in two passes; `far` where it is more, to which weights can be added.
+pub(crate) fn least_steps<T: Copy + Default + Ord + Add<Output = T>>(
     starts: &[bool],
     width: usize,
     height: usize,
-    straight: u32,
-    diagonal: u32,
-) -> Result<Vec<u32>, Error> {
-    let mut map = table(starts.iter().map(|&start| if start { 0 } else { FAR }))?;
-    let from_next_row = |row: &mut [u32], next: &[u32]| {
+    far: T,
+    straight: T,
+    diagonal: T,
+) -> Result<Vec<T>, Error> {
+    let mut map = table(starts.iter().map(|&start| if start { T::default() } else { far }))?;
+    // The steps along a row, one way or the other.
+    let along_step = |before: T, to: &mut T| {
+        step(to, before, straight);
+        *to
+    };
+    let from_next_row = |row: &mut [T], next: &[T]| {
         row.iter_mut().zip(next).for_each(|(to, from)| step(to, *from, straight));
         row[1..].iter_mut().zip(next).for_each(|(to, from)| step(to, *from, diagonal));
         row.iter_mut().zip(&next[1..]).for_each(|(to, from)| step(to, *from, diagonal));
@@ -116,14 +112,14 @@ pub(crate) fn least_steps(
         if y > 0 {
             from_next_row(row, &above[(y - 1) * width..]);
         }
-        along(row[..width].iter_mut(), straight);
+        row[..width].iter_mut().fold(far, along_step);
     }
     for y in (0..height).rev() {
         let (row, below) = map[y * width..].split_at_mut(width);
         if y + 1 < height {
             from_next_row(row, &below[..width]);
         }
-        along(row.iter_mut().rev(), straight);
+        row.iter_mut().rfold(far, along_step);
     }
     Ok(map)
 }

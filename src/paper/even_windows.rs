@@ -55,7 +55,7 @@ pub(crate) struct Asked<'a> {
     /// block by block; 0 for a block that takes none.
     pub levels: &'a [u8],
     /// The largest radius of a window without a depth change, pixel by pixel.
-    pub clean: &'a [u32],
+    pub clean: &'a [i16],
     /// The largest radius of all.
     pub limit: u32,
     /// The smallest variance that is told from none.
@@ -131,7 +131,8 @@ pub(crate) fn even_windows<'a>(
 /// That of one block: the plain form.
 pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<EvenWindow> {
     let pixel = asked.blocks.middle(block);
-    let (wanted, clean) = (asked.wanted[block], asked.clean[cloud.index(pixel.0, pixel.1)]);
+    let clean = asked.clean[cloud.index(pixel.0, pixel.1)] as u32;
+    let wanted = asked.wanted[block];
     let rect = |radius: u32| Rect::around(pixel, radius as usize, (cloud.width, cloud.height));
     let plane = |radius: u32| Plane::of(cloud, &rect(radius));
     let jagged = |radius: u32| {

@@ -691,7 +691,7 @@ impl Rows {
                     *to = if *concerned { *depth } else { f32::NAN };
                 }
                 for (to, clean) in self.clean[first..].iter_mut().zip(&asked.clean[pixels]) {
-                    *to = *clean as f32;
+                    *to = (*clean).into();
                 }
             }
         }

@@ -191,7 +191,7 @@ impl EvenTile<'_> {
         for (lane, block) in blocks.enumerate() {
             if self.needed[block] {
                 wanted[lane] = self.asked.wanted[block] as f32;
-                clean[lane] = clean_radii[(pixel.0 + lane * BLOCK).min(width - 1)] as f32;
+                clean[lane] = clean_radii[(pixel.0 + lane * BLOCK).min(width - 1)].into();
                 largest[lane] = (self.asked.largest(block) as f32).min(clean[lane]);
             }
         }

@@ -188,7 +188,8 @@ pub(crate) fn even_windows(
     let parts = Parts(windows.as_mut_ptr());
     let radius = |block: usize| {
         let (x, y) = blocks.middle(block);
-        asked.largest(block).min(asked.clean[cloud.index(x, y)]).max(asked.wanted[block])
+        let clean = asked.clean[cloud.index(x, y)] as u32;
+        asked.largest(block).min(clean).max(asked.wanted[block])
     };
     let needed_blocks = (0..blocks.count()).filter(|block| needed[*block]);
     let largest = needed_blocks.map(radius).max().unwrap_or(0) as usize;
