@@ -75,6 +75,13 @@ impl<S: Simd> Floats<S> {
         Floats(unsafe { S::sqrt(self.0) })
     }
 
+    /// Takes another's lanes of a mask.
+    #[inline(always)]
+    pub fn take(&mut self, mask: S::F, other: Self) {
+        // SAFETY: there is a group, so there is the instruction set.
+        self.0 = unsafe { S::select(mask, other.0, self.0) };
+    }
+
     /// Bit l is `self < other` in lane l.
     #[inline(always)]
     pub fn lt(self, other: Self) -> u32 {

@@ -127,8 +127,8 @@ struct Pixels<S: Simd> {
     number: Floats<S>,
     /// Where it is, from the block's middle pixel.
     at: [Floats<S>; 2],
-    /// The mask of those that are not missing.
-    there: S::F,
+    /// The mask of those that take a window.
+    there: Floats<S>,
     inverse_depth: Floats<S>,
     tolerance: Floats<S>,
     near: Near<S>,
@@ -156,26 +156,17 @@ impl<S: Simd> Windows<S> {
     }
 
     /// Takes the others of a mask.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn replace(&mut self, mask: S::F, other: &Self) {
-        // SAFETY: as the caller's.
-        unsafe {
-            let select = |to: &mut Floats<S>, other: Floats<S>| {
-                to.0 = S::select(mask, other.0, to.0);
-            };
-            for axis in 0..2 {
-                select(&mut self.middle[axis], other.middle[axis]);
-                select(&mut self.planes.slope[axis], other.planes.slope[axis]);
-            }
-            select(&mut self.planes.at_middle, other.planes.at_middle);
-            select(&mut self.radius, other.radius);
-            select(&mut self.per_bend, other.per_bend);
-            select(&mut self.even, other.even);
-            select(&mut self.jitter, other.jitter);
+    fn take(&mut self, mask: S::F, other: &Self) {
+        for axis in 0..2 {
+            self.middle[axis].take(mask, other.middle[axis]);
+            self.planes.slope[axis].take(mask, other.planes.slope[axis]);
         }
+        self.planes.at_middle.take(mask, other.planes.at_middle);
+        self.radius.take(mask, other.radius);
+        self.per_bend.take(mask, other.per_bend);
+        self.even.take(mask, other.even);
+        self.jitter.take(mask, other.jitter);
     }
 
     /// What the windows cost a pixel of each block; infinite where they end short of it and of its surface.
@@ -206,27 +197,18 @@ impl<S: Simd> Windows<S> {
 
 impl<S: Simd> Pixels<S> {
     /// Takes the others of a mask.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn replace(&mut self, mask: S::F, other: &Self) {
-        // SAFETY: as the caller's.
-        unsafe {
-            let select = |to: &mut Floats<S>, other: Floats<S>| {
-                to.0 = S::select(mask, other.0, to.0);
-            };
-            for axis in 0..2 {
-                select(&mut self.at[axis], other.at[axis]);
-                select(&mut self.near.at[axis], other.near.at[axis]);
-            }
-            select(&mut self.number, other.number);
-            self.there = S::select(mask, other.there, self.there);
-            select(&mut self.inverse_depth, other.inverse_depth);
-            select(&mut self.tolerance, other.tolerance);
-            select(&mut self.near.inverse_depth, other.near.inverse_depth);
-            select(&mut self.near.points, other.near.points);
+    fn take(&mut self, mask: S::F, other: &Self) {
+        for axis in 0..2 {
+            self.at[axis].take(mask, other.at[axis]);
+            self.near.at[axis].take(mask, other.near.at[axis]);
         }
+        self.number.take(mask, other.number);
+        self.there.take(mask, other.there);
+        self.inverse_depth.take(mask, other.inverse_depth);
+        self.tolerance.take(mask, other.tolerance);
+        self.near.inverse_depth.take(mask, other.near.inverse_depth);
+        self.near.points.take(mask, other.near.points);
     }
 }
 
@@ -353,7 +335,7 @@ impl<S: Along> Found<S> {
                 let better = S::lt(cost.0, least.0);
                 least.0 = S::select(better, (alike * cost).0, least.0);
                 best = S::select(better, S::splat(number as f32), best);
-                windows.replace(better, &candidates.windows);
+                windows.take(better, &candidates.windows);
             }
             // By chance the pixel may be nearer to the plane beyond a crease.
             least = Floats::splat(CREASE_COST) * least;
@@ -364,7 +346,7 @@ impl<S: Along> Found<S> {
                 let better = S::and(is_better, crease.is_first_side(pixels.at));
                 least.0 = S::select(better, (alike * candidates.cost).0, least.0);
                 best = S::select(better, S::splat(number as f32), best);
-                windows.replace(better, &candidates.windows);
+                windows.take(better, &candidates.windows);
             }
             (Floats(best), windows)
         }
@@ -447,7 +429,7 @@ impl Group<'_> {
             }
             let mut first = pixels[MIDDLE * BLOCK + MIDDLE];
             for other in &pixels {
-                first.replace(S::and_not(first.there, other.there), other);
+                first.take(S::and_not(first.there.0, other.there.0), other);
             }
             let (first_best, first_windows) = found.best(&first);
             let mut first_costs = [found.noise; BLOCK * BLOCK];
@@ -459,8 +441,8 @@ impl Group<'_> {
                 let is_first = S::eq(other.number.0, first.number.0);
                 let cost = Floats::<S>(S::and_not(is_first, cost.0));
                 let alike = cost * Floats::splat(ALIKE);
-                let worse = S::and(other.there, S::lt(largest, alike.0));
-                second.replace(worse, other);
+                let worse = S::and(other.there.0, S::lt(largest, alike.0));
+                second.take(worse, other);
                 largest = S::select(worse, cost.0, largest);
             }
             let (second_best, second_windows) = found.best(&second);
@@ -482,7 +464,7 @@ impl Group<'_> {
                 let takes_second = S::or(takes_second, S::eq(own.number.0, second.number.0));
                 let best = S::select(takes_second, second_best.0, first_best.0);
                 let cost = S::select(takes_second, second_cost.0, first_cost.0);
-                let takes_some = S::bits(S::and(own.there, S::lt(cost, S::splat(f32::INFINITY))));
+                let takes_some = S::bits(S::and(own.there.0, S::lt(cost, S::splat(f32::INFINITY))));
                 let mut numbers = [0; LANES];
                 S::store_i(numbers.as_mut_ptr(), S::truncate_i(best));
                 let row = number / BLOCK * width + number % BLOCK;
@@ -514,7 +496,7 @@ impl Group<'_> {
             Pixels {
                 number: Floats::splat(number as f32),
                 at: [from_middle(place[0]), from_middle(place[1])],
-                there: S::eq(depth, depth),
+                there: Floats(S::eq(depth, depth)),
                 inverse_depth: Floats(around.inverse_depths[place[1] + 1][place[0] + 1]),
                 tolerance: tolerance::<S>(depth, self.even.options),
                 near: around.near(place, noisy),
