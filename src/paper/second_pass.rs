@@ -1,9 +1,8 @@
 //! The second pass: normals near depth changes and near creases, from even windows.
 
-use std::iter::repeat_n;
-use std::ops::Range;
+use std::iter::{once, repeat_n};
 
-use super::blocks::{BLOCK, Blocks, middle};
+use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::choices::{EvenWindows, NO_WINDOW};
 use super::cloud::Cloud;
 use super::creases::SummedNormals;
@@ -66,9 +65,6 @@ pub(crate) struct SecondPass {
     taken: Vec<u32>,
     second: Vec<[f32; 4]>,
 }
-
-/// Blocks of a row that are looked at together.
-const CHUNK: usize = 32;
 
 /// As often as a radius can be halved.
 const EVERY_LEVEL: u8 = u32::BITS as u8;
@@ -141,63 +137,35 @@ impl SecondPass {
         refill(wanted, repeat_n(0, blocks.count()))?;
         refill(levels, repeat_n(0, blocks.count()))?;
         let (estimates, sizes, normals) = (&*estimates, &*sizes, &*normals);
-        let has_window = |at: usize| sizes[at] > 0 && !cloud.is_missing(at);
-        let is_near_crease = |column: usize, row: usize| {
-            let has_window = |(x, y): &(usize, usize)| has_window(cloud.index(*x, *y));
-            let at_middle = middle(column * BLOCK, BLOCK, cloud.width);
-            let pixel = Some((at_middle, middle(row * BLOCK, BLOCK, cloud.height)));
-            let place = |at: usize| (at % cloud.width, at / cloud.width);
-            let other = || blocks.pixels((column, row)).into_iter().map(place).find(has_window);
-            let with_window = pixel.filter(has_window).or_else(other);
-            with_window.is_some_and(|pixel| {
-                let size = sizes[cloud.index(pixel.0, pixel.1)];
-                normals.vary_in(&window_of_size(cloud, options, pixel, size))
-            })
+        // The window and the level of a block; marks its pixels, of which `concerned` starts with number `first`.
+        let concern = |pixels: [usize; BLOCK * BLOCK], first: usize, concerned: &mut [bool]| {
+            let has_window = |at: usize| sizes[at] > 0 && !cloud.is_missing(at);
+            let middle = pixels[MIDDLE * BLOCK + MIDDLE];
+            let with_window = || once(middle).chain(pixels).find(|at| has_window(*at));
+            let normals_vary =
+                |at: usize| normals.vary_in(&window_of_size(cloud, options, at, sizes[at]));
+            let is_near_crease = options.crease_windows && with_window().is_some_and(normals_vary);
+            let (mut largest, mut level) = (0, 0);
+            for at in pixels {
+                let size = wanted_size(cloud, options, at);
+                largest = size.max(largest);
+                let has_none = || estimates[at][0].is_nan() && !cloud.is_missing(at);
+                if options.one_sided_windows && (sizes[at] < size || has_none()) {
+                    concerned[at - first] = true;
+                    level = EVERY_LEVEL;
+                } else if is_near_crease && has_window(at) {
+                    concerned[at - first] = true;
+                    level = CREASE_LEVELS.max(level);
+                }
+            }
+            (radius_of_size(largest, options).min(options.paper.largest_radius), level)
         };
         let rows = concerned.chunks_mut(BLOCK * cloud.width).enumerate();
         let of_blocks = wanted.chunks_mut(blocks.across).zip(levels.chunks_mut(blocks.across));
         workers.each(rows.zip(of_blocks), |((row, concerned), (wanted, levels))| {
-            let mut wanted_sizes = [0; CHUNK * BLOCK];
-            for (line, concerned) in concerned.chunks_mut(cloud.width).enumerate() {
-                let first = (row * BLOCK + line) * cloud.width;
-                let chunks =
-                    concerned.chunks_mut(CHUNK * BLOCK).zip((first..).step_by(CHUNK * BLOCK));
-                let of_blocks = wanted.chunks_mut(CHUNK).zip(levels.chunks_mut(CHUNK));
-                for ((concerned, first), (wanted, levels)) in chunks.zip(of_blocks) {
-                    let pixels = first..first + concerned.len();
-                    let wanted_sizes = &mut wanted_sizes[..pixels.len()];
-                    find_wanted_sizes(cloud, options, pixels.clone(), wanted_sizes);
-                    for (to, sizes) in wanted.iter_mut().zip(wanted_sizes.chunks(BLOCK)) {
-                        *to = sizes.iter().fold(*to, |largest, size| largest.max(*size));
-                    }
-                    if !options.one_sided_windows {
-                        continue;
-                    }
-                    for ((concerned, at), wanted) in
-                        concerned.iter_mut().zip(pixels).zip(&*wanted_sizes)
-                    {
-                        let has_none = estimates[at][0].is_nan() & !cloud.is_missing(at);
-                        *concerned = (sizes[at] < *wanted) | has_none;
-                    }
-                    for (level, concerned) in levels.iter_mut().zip(concerned.chunks(BLOCK)) {
-                        if concerned.contains(&true) {
-                            *level = EVERY_LEVEL;
-                        }
-                    }
-                }
-            }
             for (column, (wanted, level)) in wanted.iter_mut().zip(levels).enumerate() {
-                *wanted = radius_of_size(*wanted, options).min(options.paper.largest_radius);
-                if options.crease_windows && is_near_crease(column, row) {
-                    *level = CREASE_LEVELS.max(*level);
-                    let columns = column * BLOCK..((column + 1) * BLOCK).min(cloud.width);
-                    for (line, concerned) in concerned.chunks_mut(cloud.width).enumerate() {
-                        let first = (row * BLOCK + line) * cloud.width;
-                        for x in columns.clone() {
-                            concerned[x] |= has_window(first + x);
-                        }
-                    }
-                }
+                let pixels = blocks.pixels((column, row));
+                (*wanted, *level) = concern(pixels, row * BLOCK * cloud.width, concerned);
             }
         });
         Ok(())
@@ -246,19 +214,13 @@ fn asks(options: &Options) -> bool {
     options.one_sided_windows || options.crease_windows
 }
 
-/// The sizes that the windows of pixels have far from any depth change, as [`Engine::windows`] gives them; 0 at missing
-/// points.
-fn find_wanted_sizes(cloud: &Cloud, options: &Options, pixels: Range<usize>, sizes: &mut [u32]) {
+/// The size that the window of a pixel has far from any depth change, as [`Engine::windows`] gives them; 0 at a
+/// missing point.
+fn wanted_size(cloud: &Cloud, options: &Options, at: usize) -> u32 {
     match options.semantics {
-        Semantics::Paper => {
-            for (to, depth) in sizes.iter_mut().zip(&cloud.depths[pixels]) {
-                *to = smoothing_area::depth_radius(*depth, &options.paper) as u32;
-            }
-        }
+        Semantics::Paper => smoothing_area::depth_radius(cloud.depths[at], &options.paper) as u32,
         Semantics::Pcl => {
-            for (to, [.., z]) in sizes.iter_mut().zip(&cloud.points[pixels]) {
-                *to = crate::smoothing_area::window_side(f32::INFINITY, *z, options);
-            }
+            crate::smoothing_area::window_side(f32::INFINITY, cloud.points[at][2], options)
         }
     }
 }
@@ -272,8 +234,9 @@ fn radius_of_size(size: u32, options: &Options) -> u32 {
 }
 
 /// The window of a size as [`Engine::windows`] gives them, without what lies outside the image.
-fn window_of_size(cloud: &Cloud, options: &Options, pixel: (usize, usize), size: u32) -> Rect {
-    let (width, height, size) = (cloud.width, cloud.height, size as usize);
+fn window_of_size(cloud: &Cloud, options: &Options, at: usize, size: u32) -> Rect {
+    let (width, height) = (cloud.width, cloud.height);
+    let (pixel, size) = ((at % width, at / width), size as usize);
     match options.semantics {
         Semantics::Paper => window(pixel, size, width, height),
         Semantics::Pcl => rect_around(pixel, (size, size), (width, height)),
