@@ -7,11 +7,13 @@
 //! it does so for the other column.
 //!
 //! A cloud far from the camera's origin, as in a map's frame, may take a quarter more; one with a far plane for "no
-//! return", as simulators write, with PCL's semantics three times as many.
+//! return", as simulators write, with PCL's semantics three times as many; and the paper's CM with a second pass for both
+//! one-sided and crease windows five times.
 //!
-//! The program runs itself under valgrind: `frames N SEMANTICS METHOD POLICY METRES PLANE` computes N frames of a cloud
-//! that is moved to the right by so many metres, with a far plane at that depth if it is not 0. The counts are the
-//! difference between two frames and one, so neither start nor the first frame's allocations are in them.
+//! The program runs itself under valgrind: `frames N SEMANTICS METHOD POLICY METRES PLANE SECOND` computes N frames of a
+//! cloud that is moved to the right by so many metres, with a far plane at that depth if it is not 0, and with a second
+//! pass if that is 1. The counts are the difference between two frames and one, so neither start nor the first frame's
+//! allocations are in them.
 
 #[path = "../benches/common/mod.rs"]
 mod common;
@@ -52,7 +54,8 @@ fn main() -> ExitCode {
     if arguments.first().is_some_and(|word| word == "frames") {
         let number = |k: usize| arguments[k].parse::<usize>().expect("a number");
         let (method, policy) = (Method::ALL[number(3)], BorderPolicy::ALL[number(4)]);
-        let scene = [5, 6].map(|k| number(k) as f32);
+        let scene =
+            Scene { moved: number(5) as f32, plane: number(6) as f32, second_pass: number(7) == 1 };
         frames(number(1), Semantics::ALL[number(2)], method, policy, scene);
         return ExitCode::SUCCESS;
     }
@@ -85,12 +88,17 @@ fn main() -> ExitCode {
             println!("{verdict} {name}{what}: {count} instructions a pixel, at most {bound}");
             good &= count <= bound;
         };
-        let count = |scene: [f32; 2]| count(semantics, method, policy, scene, isa);
-        let (far, _) = count([FAR, 0.0]);
+        let count = |scene: Scene| count(semantics, method, policy, scene, isa);
+        let usual = Scene { moved: 0.0, plane: 0.0, second_pass: false };
+        let (far, _) = count(Scene { moved: FAR, ..usual });
         if semantics == Pcl {
-            check(count([0.0, PLANE]).0, 3 * bound, ", with a far plane");
+            check(count(Scene { plane: PLANE, ..usual }).0, 3 * bound, ", with a far plane");
         }
-        let (count, stages) = count([0.0; 2]);
+        if (semantics, method) == (Paper, CovarianceMatrix) {
+            let (count, _) = count(Scene { second_pass: true, ..usual });
+            check(count, 5 * bound, ", with a second pass");
+        }
+        let (count, stages) = count(usual);
         check(count, bound, "");
         check(far, bound + bound / 4, ", far away");
         if printing {
@@ -111,13 +119,21 @@ fn main() -> ExitCode {
     if good { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
+/// How far the cloud is moved, the depth of a far plane or 0, and whether there is a second pass.
+#[derive(Clone, Copy)]
+struct Scene {
+    moved: f32,
+    plane: f32,
+    second_pass: bool,
+}
+
 /// What is counted.
 fn frames(
     number: usize,
     semantics: Semantics,
     method: Method,
     border_policy: BorderPolicy,
-    [moved, plane]: [f32; 2],
+    Scene { moved, plane, second_pass }: Scene,
 ) {
     let mut cloud = Cloud::generated(WIDTH, HEIGHT);
     for (at, point) in cloud.data.chunks_mut(common::POINT).enumerate() {
@@ -132,6 +148,8 @@ fn frames(
     options.method = method;
     options.border_policy = border_policy;
     options.depth_dependent_smoothing = true;
+    options.one_sided_windows = second_pass;
+    options.crease_windows = second_pass;
     let mut estimator = Estimator::new(options);
     let mut output = cloud.output();
     for _ in 0..number {
@@ -146,12 +164,12 @@ fn count(
     semantics: Semantics,
     method: Method,
     policy: BorderPolicy,
-    [moved, plane]: [f32; 2],
+    Scene { moved, plane, second_pass }: Scene,
     isa: Isa,
 ) -> (u64, Vec<(&'static str, u64)>) {
     let started = [1, 2].map(|number| {
         let output = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!(
-            "callgrind.{semantics:?}.{method:?}.{policy:?}.{moved}.{plane}.{number}"
+            "callgrind.{semantics:?}.{method:?}.{policy:?}.{moved}.{plane}.{second_pass}.{number}"
         ));
         let child = Command::new("valgrind")
             .arg("--tool=callgrind")
@@ -160,6 +178,7 @@ fn count(
             .args(["frames", &number.to_string(), &(semantics as i32).to_string()])
             .args([(method as i32).to_string(), (policy as i32).to_string()])
             .args([moved, plane].map(|metres| metres.to_string()))
+            .arg(u8::from(second_pass).to_string())
             .env("IINE_ISA", isa.name())
             .stderr(std::process::Stdio::null())
             .spawn();
