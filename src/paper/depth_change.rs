@@ -38,7 +38,7 @@ impl DepthChanges {
     pub fn find(
         cloud: &Cloud,
         workers: &Workers,
-        is_change: impl Fn(f32, f32, usize) -> bool + Sync,
+        is_change: impl Fn(f32, f32, usize) -> bool + Clone + Sync,
     ) -> Result<Self, Error> {
         let (width, height) = (cloud.width, cloud.height);
         let mut right = table(repeat_n(false, width * height))?;
@@ -47,6 +47,8 @@ impl DepthChanges {
         let rows = right.chunks_mut(width).zip(below.chunks_mut(width)).enumerate();
         workers.each(rows, |(y, (right, below))| {
             let (row, next) = (y * width, (y + 1) * width);
+            // The row's own: what is found is not written to it, and loops are vectorized.
+            let is_change = is_change.clone();
             // To the pixels behind them in their row, axis 0, and in their columns.
             let behind = [row + 1..next, next..(next + width).min(depths.len())];
             for (axis, (changes, behind)) in [right, below].into_iter().zip(behind).enumerate() {

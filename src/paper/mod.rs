@@ -124,9 +124,8 @@ fn depth_changes(
     options: &Options,
     workers: &Workers,
 ) -> Result<DepthChanges, Error> {
-    // A copy: what is found is not written to it, and loops are vectorized.
     let options = options.clone();
-    DepthChanges::find(cloud, workers, |depth, difference, gap| {
+    DepthChanges::find(cloud, workers, move |depth, difference, gap| {
         is_depth_change(depth, difference, gap, &options)
     })
 }
