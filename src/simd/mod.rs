@@ -161,6 +161,23 @@ pub(crate) trait Along: Simd {
     }
 }
 
+/// Four floats for each lane from its place on: the first ones, the second ones and so on.
+///
+/// # Safety
+/// As [`Simd`].
+#[inline(always)]
+pub(crate) unsafe fn load_by_fours<S: Along>(place: impl Fn(usize) -> *const f32) -> [S::F; 4] {
+    // SAFETY: as the caller's.
+    unsafe {
+        S::transpose_fours([
+            S::load_fours(|four| place(4 * four)),
+            S::load_fours(|four| place(4 * four + 1)),
+            S::load_fours(|four| place(4 * four + 2)),
+            S::load_fours(|four| place(4 * four + 3)),
+        ])
+    }
+}
+
 /// [`Simd::load_points`]
 ///
 /// # Safety
@@ -169,13 +186,7 @@ pub(crate) trait Along: Simd {
 unsafe fn load_points_by_fours<S: Along>(first: *const f32, step: usize) -> [S::F; 3] {
     // SAFETY: as the caller's.
     unsafe {
-        let point = |i: usize| first.byte_add(i * step);
-        let [x, y, z, _] = S::transpose_fours([
-            S::load_fours(|four| point(4 * four)),
-            S::load_fours(|four| point(4 * four + 1)),
-            S::load_fours(|four| point(4 * four + 2)),
-            S::load_fours(|four| point(4 * four + 3)),
-        ]);
+        let [x, y, z, _] = load_by_fours::<S>(|lane| first.byte_add(lane * step));
         [x, y, z]
     }
 }

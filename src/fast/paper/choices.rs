@@ -16,7 +16,7 @@ use crate::paper::{
     ALIKE, BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows,
     JITTER, MIDDLE, MISFIT, NEAR, NEAR_NOISE, PLACES, REACH, inverse_depth,
 };
-use crate::simd::{Along, Groups, Simd};
+use crate::simd::{Along, Groups, Simd, load_by_fours};
 
 /// Finds the choices of the pixels of some rows of blocks, which are none so far.
 ///
@@ -258,12 +258,8 @@ impl<S: Along> Found<S> {
         for first in [0, 4] {
             // SAFETY: as the caller's; a window is eight floats.
             unsafe {
-                let mut fields = [S::splat(0.0); 4];
-                for i in 0..4 {
-                    let at = |four: usize| windows.add(to.places[i + 4 * four] as usize);
-                    fields[i] = S::load_fours(|four| at(four).cast::<f32>().add(first));
-                }
-                let fields = S::transpose_fours(fields);
+                let window = |lane: usize| windows.add(to.places[lane] as usize);
+                let fields = load_by_fours::<S>(|lane| window(lane).cast::<f32>().add(first));
                 for i in 0..4 {
                     to.fields[first + i] = Floats(fields[i]);
                 }
@@ -730,15 +726,7 @@ impl Rows {
 #[inline(always)]
 unsafe fn columns_from<S: Along>(row: *const f32, columns: &[usize; LANES]) -> [S::F; 4] {
     // SAFETY: as the caller's.
-    unsafe {
-        let at = |lane: usize| row.add(columns[lane]);
-        S::transpose_fours([
-            S::load_fours(|four| at(4 * four)),
-            S::load_fours(|four| at(4 * four + 1)),
-            S::load_fours(|four| at(4 * four + 2)),
-            S::load_fours(|four| at(4 * four + 3)),
-        ])
-    }
+    unsafe { load_by_fours::<S>(|lane| row.add(columns[lane])) }
 }
 
 impl<S: Simd> Around<S> {

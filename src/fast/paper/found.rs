@@ -6,7 +6,7 @@ use crate::fast::lanes::LANES;
 use crate::fast::tile::{Bits, turned};
 use crate::options::Options;
 use crate::paper::{Cloud, SecondPass};
-use crate::simd::Along;
+use crate::simd::{Along, load_by_fours};
 
 /// A row of pixels that is written.
 pub(super) struct FoundRow<'a> {
@@ -37,12 +37,7 @@ impl FoundRow<'_> {
             }
             // SAFETY: as the caller's; an estimate is four floats, and so many points are there.
             unsafe {
-                let [nx, ny, nz, curvature] = S::transpose_fours([
-                    S::load_fours(|four| found[4 * four]),
-                    S::load_fours(|four| found[4 * four + 1]),
-                    S::load_fours(|four| found[4 * four + 2]),
-                    S::load_fours(|four| found[4 * four + 3]),
-                ]);
+                let [nx, ny, nz, curvature] = load_by_fours::<S>(|lane| found[lane]);
                 let points = cloud.points[at..][..S::LANES].as_ptr().cast();
                 let [px, py, pz] = S::load_points(points, size_of::<[f32; 3]>());
                 let normal = [Floats(nx), Floats(ny), Floats(nz)];
