@@ -437,7 +437,7 @@ impl paper::Engine for Engine<'_> {
             even.choose(choices);
             return Ok(());
         }
-        fast::paper::choices(self.isa, even, choices, self.workers())
+        fast::paper::choices(self.isa, even, choices, self.scratch)
     }
 
     fn of_blocks(

@@ -11,7 +11,7 @@ use clouds::{
     Cloud, Kind, Random, assert_same_bits, compute, compute_listed, compute_to, edge_options,
     fast_isas, methods, options, paper_options,
 };
-use iine::{BorderPolicy, Error, Estimator, Isa, Method, Normals, Options};
+use iine::{BorderPolicy, DistanceMetric, Error, Estimator, Isa, Method, Normals, Options};
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
@@ -219,6 +219,34 @@ fn scratch_memory_is_small_and_stays() {
                     assert_eq!(estimator.scratch_size(), 0);
                 }
             }
+        }
+    }
+}
+
+/// Also where later frames have larger windows. (Maps with the chamfer metric are of the plain form.)
+#[test]
+fn only_the_first_frame_allocates() {
+    let (width, height) = (200, 150);
+    let frames = [16, 17].map(|seed| Cloud::new(Kind::NanBlocks, width, height, seed));
+    let mut found = vec![[0.0; 4]; width * height];
+    let mut all = paper_options();
+    all.extend(edge_options());
+    all.retain(|options| options.paper.distance_metric == DistanceMetric::Euclidean);
+    all.extend(methods().map(|method| options(method, 20.0, true)));
+    for mut options in all {
+        options.threads = 1;
+        let what = format!("{options:?}");
+        let mut estimator = Estimator::new(options);
+        let mut frame = |cloud: &Cloud| {
+            let data = found.as_flattened_mut();
+            let mut normals = Normals::interleaved(data, width, height, 4, 0, Some(3)).unwrap();
+            let before = ALLOCATIONS.with(Cell::get);
+            estimator.compute(&cloud.view(), &mut normals).unwrap();
+            (estimator.scratch_size(), ALLOCATIONS.with(Cell::get) - before)
+        };
+        let (size, _) = frame(&frames[0]);
+        for again in [&frames[0], &frames[1]] {
+            assert_eq!(frame(again), (size, 0), "{what}");
         }
     }
 }

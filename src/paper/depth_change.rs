@@ -16,34 +16,42 @@ use super::distance::least_steps;
 use super::planes::{JITTER, Plane, inverse_depth};
 use super::rect::Rect;
 use crate::Error;
-use crate::memory::table;
+use crate::memory::{bytes, refill, table};
 use crate::threads::Workers;
 
 /// More than any window's radius. (Signed: every processor has the least of eight.)
 const LARGEST_CLEAN: i16 = i16::MAX / 2;
 
-/// Where there are depth changes, row by row.
+/// Where there are depth changes, row by row; kept from frame to frame.
+#[derive(Debug, Default)]
 pub(crate) struct DepthChanges {
-    width: usize,
-    height: usize,
     /// Between a pixel and its right neighbour.
     right: Vec<bool>,
     /// Between a pixel and its lower neighbour.
     below: Vec<bool>,
+    /// The pixels that have a change among those next to them.
+    spoilt: Vec<bool>,
+    clean_radii: Vec<i16>,
 }
 
 impl DepthChanges {
-    /// The changes of a cloud: `is_change(depth, difference, gap)` says whether a difference in depth to the
+    /// Bytes held.
+    pub fn size(&self) -> usize {
+        bytes(&self.right) + bytes(&self.below) + bytes(&self.spoilt) + bytes(&self.clean_radii)
+    }
+
+    /// Becomes the changes of a cloud: `is_change(depth, difference, gap)` says whether a difference in depth to the
     /// neighbour `gap` pixels to the right or below is one; no NaN is.
     pub fn find(
+        &mut self,
         cloud: &Cloud,
         workers: &Workers,
         is_change: impl Fn(f32, f32, usize) -> bool + Clone + Sync,
-    ) -> Result<Self, Error> {
-        let (width, height) = (cloud.width, cloud.height);
-        let mut right = table(repeat_n(false, width * height))?;
-        let mut below = table(repeat_n(false, width * height))?;
-        let depths = &cloud.depths;
+    ) -> Result<(), Error> {
+        let &Cloud { width, height, ref depths, .. } = cloud;
+        let DepthChanges { right, below, .. } = self;
+        refill(right, repeat_n(false, width * height))?;
+        refill(below, repeat_n(false, width * height))?;
         let rows = right.chunks_mut(width).zip(below.chunks_mut(width)).enumerate();
         workers.each(rows, |(y, (right, below))| {
             let (row, next) = (y * width, (y + 1) * width);
@@ -66,7 +74,7 @@ impl DepthChanges {
                 }
             }
         });
-        Ok(DepthChanges { width, height, right, below })
+        Ok(())
     }
 
     /// The paper's C.
@@ -74,13 +82,13 @@ impl DepthChanges {
         table(self.right.iter().zip(&self.below).map(|(right, below)| *right || *below))
     }
 
-    /// Without the changes that the slope of the surface on both sides explains: on a steep surface neighbours are
-    /// as far apart as across an edge.
-    pub fn not_explained(mut self, cloud: &Cloud, workers: &Workers) -> Self {
+    /// Drops the changes that the slope of the surface on both sides explains: on a steep surface neighbours are as far
+    /// apart as across an edge.
+    pub fn drop_explained(&mut self, cloud: &Cloud, workers: &Workers) {
         /// How far the surface is looked at along and across a change, in pixels.
         const ALONG: usize = 5;
         const ACROSS: usize = 2;
-        let Self { width, height, .. } = self;
+        let &Cloud { width, height, .. } = cloud;
         let inverse = |at: usize| f64::from(inverse_depth(cloud.depths[at]));
         // `at` is the last pixel before the change.
         let is_explained = |axis: usize, at: usize| {
@@ -111,15 +119,13 @@ impl DepthChanges {
                 for_each_change(row, |x, change| *change = !is_explained(axis, y * width + x));
             });
         }
-        self
     }
 
     /// The largest radius around every pixel, row by row, of a window in which no two neighbours are a depth change
     /// apart; at most `LARGEST_CLEAN`, as where there is no change.
-    pub fn clean_radii(self) -> Result<Vec<i16>, Error> {
-        let Self { width, height, mut right, mut below } = self;
-        // The pixels that have a change among those next to them: the radius is the chessboard distance from them.
-        let mut spoilt = table(repeat_n(false, width * height))?;
+    pub fn clean_radii(&mut self, width: usize, height: usize) -> Result<&[i16], Error> {
+        let DepthChanges { right, below, spoilt, clean_radii } = self;
+        refill(spoilt, repeat_n(false, width * height))?;
         let mut spoil = |columns: Range<usize>, rows: Range<usize>| {
             for y in rows {
                 spoilt[y * width..][columns.clone()].fill(true);
@@ -131,7 +137,9 @@ impl DepthChanges {
             for_each_change(right, |x, _| spoil(x..x + 2, around(y, height)));
             for_each_change(below, |x, _| spoil(around(x, width), y..y + 2));
         }
-        least_steps(&spoilt, width, height, LARGEST_CLEAN, 1, 1)
+        // The chessboard distance.
+        least_steps(clean_radii, spoilt, (width, height), LARGEST_CLEAN, 1, 1)?;
+        Ok(clean_radii)
     }
 }
 

@@ -4,7 +4,7 @@ use std::iter::repeat_n;
 use std::ops::Add;
 
 use crate::Error;
-use crate::memory::table;
+use crate::memory::{refill, table};
 use crate::options::DistanceMetric;
 
 /// The distance map of a depth change map; infinite everywhere if there is no change.
@@ -78,7 +78,9 @@ fn chamfer(changes: &[bool], width: usize, height: usize) -> Result<Vec<f32>, Er
     let pixels = |value: u32| {
         if value >= FAR { f32::INFINITY } else { value as f32 / STRAIGHT as f32 }
     };
-    table(least_steps(changes, width, height, FAR, STRAIGHT, DIAGONAL)?.into_iter().map(pixels))
+    let mut steps = Vec::new();
+    least_steps(&mut steps, changes, (width, height), FAR, STRAIGHT, DIAGONAL)?;
+    table(steps.into_iter().map(pixels))
 }
 
 #[inline(always)]
@@ -86,17 +88,17 @@ fn step<T: Copy + Ord + Add<Output = T>>(to: &mut T, from: T, weight: T) {
     *to = (*to).min(from + weight);
 }
 
-/// The least weight of the steps along rows and columns and along diagonals that lead to every pixel from one of the
-/// `starts`, in two passes; `far` where it is more, to which weights can be added.
+/// Puts into a map the least weight of the steps along rows and columns and along diagonals that lead to every pixel from
+/// one of the `starts`, in two passes; `far` where it is more, to which weights can be added.
 pub(crate) fn least_steps<T: Copy + Default + Ord + Add<Output = T>>(
+    map: &mut Vec<T>,
     starts: &[bool],
-    width: usize,
-    height: usize,
+    (width, height): (usize, usize),
     far: T,
     straight: T,
     diagonal: T,
-) -> Result<Vec<T>, Error> {
-    let mut map = table(starts.iter().map(|&start| if start { T::default() } else { far }))?;
+) -> Result<(), Error> {
+    refill(map, starts.iter().map(|&start| if start { T::default() } else { far }))?;
     // The steps along a row, one way or the other.
     let along_step = |before: T, to: &mut T| {
         step(to, before, straight);
@@ -121,7 +123,7 @@ pub(crate) fn least_steps<T: Copy + Default + Ord + Add<Output = T>>(
         }
         row.iter_mut().rfold(far, along_step);
     }
-    Ok(map)
+    Ok(())
 }
 
 #[cfg(test)]

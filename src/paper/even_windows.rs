@@ -11,7 +11,7 @@ use super::cloud::Cloud;
 use super::planes::Plane;
 use super::rect::Rect;
 use crate::Error;
-use crate::memory::table;
+use crate::memory::refill;
 
 /// Inverse depths that deviate less than this many alpha from a plane are as good as in it.
 const EVEN: f32 = 0.02;
@@ -90,13 +90,13 @@ impl Asked<'_> {
         }
     }
 
-    /// Whether some pixel can take a block's window, block by block.
-    pub fn needed(&self) -> Result<Vec<bool>, Error> {
-        let mut needed = table(repeat_n(false, self.blocks.count()))?;
+    /// Notes whether some pixel can take a block's window, block by block.
+    pub fn needed(&self, needed: &mut Vec<bool>) -> Result<(), Error> {
+        refill(needed, repeat_n(false, self.blocks.count()))?;
         for block in (0..needed.len()).filter(|block| self.levels[*block] > 0) {
             self.for_each_place(block, |place| needed[place] = true);
         }
-        Ok(needed)
+        Ok(())
     }
 
     /// The variance told from none where the sensor's smallest depth change is `alpha`.

@@ -64,7 +64,9 @@ impl PaperMaps {
     pub fn new(points: &Points, options: &Options) -> Result<Self, Error> {
         let cloud = Cloud::new(points, options)?;
         let paper = &options.paper;
-        let depth_changes = depth_changes(&cloud, options, &Workers::default())?.map()?;
+        let mut depth_changes = DepthChanges::default();
+        find_depth_changes(&mut depth_changes, &cloud, options, &Workers::default())?;
+        let depth_changes = depth_changes.map()?;
         let distances = distance::distance_map(
             &depth_changes,
             cloud.width,
@@ -119,13 +121,14 @@ pub(crate) fn estimate_window(
     methods::estimate(options.method, &cleaned, &rect)
 }
 
-fn depth_changes(
+fn find_depth_changes(
+    changes: &mut DepthChanges,
     cloud: &Cloud,
     options: &Options,
     workers: &Workers,
-) -> Result<DepthChanges, Error> {
+) -> Result<(), Error> {
     let options = options.clone();
-    DepthChanges::find(cloud, workers, move |depth, difference, gap| {
+    changes.find(cloud, workers, move |depth, difference, gap| {
         is_depth_change(depth, difference, gap, &options)
     })
 }

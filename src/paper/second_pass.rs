@@ -6,9 +6,12 @@ use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::choices::{EvenWindows, NO_WINDOW};
 use super::cloud::Cloud;
 use super::creases::SummedNormals;
+use super::depth_change::DepthChanges;
 use super::even_windows::{Asked, EvenWindow};
 use super::rect::Rect;
-use super::{depth_changes, is_depth_change, rect_around, smoothing_area, surroundings, window};
+use super::{
+    find_depth_changes, is_depth_change, rect_around, smoothing_area, surroundings, window,
+};
 use crate::Error;
 use crate::memory::{bytes, refill};
 use crate::methods::Estimate;
@@ -59,6 +62,8 @@ pub(crate) struct SecondPass {
     /// As [`Asked`] has them.
     wanted: Vec<u32>,
     levels: Vec<u8>,
+    depth_changes: DepthChanges,
+    needed: Vec<bool>,
     windows: Vec<EvenWindow>,
     choices: Vec<u32>,
     /// The radii of the windows that some pixel takes, and their estimates.
@@ -81,6 +86,8 @@ impl SecondPass {
             + bytes(&self.concerned)
             + bytes(&self.wanted)
             + bytes(&self.levels)
+            + self.depth_changes.size()
+            + bytes(&self.needed)
             + bytes(&self.windows)
             + bytes(&self.choices)
             + bytes(&self.taken)
@@ -100,14 +107,17 @@ impl SecondPass {
         }
         let blocks = Blocks::of(cloud.width, cloud.height);
         self.concern(cloud, &blocks, options, engine.workers())?;
-        let SecondPass { concerned, wanted, levels, windows, choices, taken, second, .. } = self;
-        let clean = depth_changes(cloud, options, engine.workers())?;
-        let clean = clean.not_explained(cloud, engine.workers()).clean_radii()?;
+        let SecondPass { concerned, wanted, levels, depth_changes, needed, .. } = self;
+        let (windows, choices) = (&mut self.windows, &mut self.choices);
+        let (taken, second) = (&mut self.taken, &mut self.second);
+        find_depth_changes(depth_changes, cloud, options, engine.workers())?;
+        depth_changes.drop_explained(cloud, engine.workers());
+        let clean = depth_changes.clean_radii(cloud.width, cloud.height)?;
         let least_noise = Asked::least_noise(options.paper.alpha);
         let limit = options.paper.largest_radius;
-        let clean = &clean;
         let asked = Asked { blocks, concerned, wanted, levels, clean, limit, least_noise };
-        engine.even_windows(cloud, &asked, &asked.needed()?, windows)?;
+        asked.needed(needed)?;
+        engine.even_windows(cloud, &asked, needed, windows)?;
         let even = EvenWindows { cloud, asked: &asked, options, windows };
         engine.choices(&even, choices)?;
         refill(taken, repeat_n(0, blocks.count()))?;

@@ -10,7 +10,7 @@ use crate::fast::arithmetic::Floats;
 use crate::fast::lanes::{LANES, Lanes};
 use crate::fast::tile::Bits;
 use crate::fast::windows::threshold;
-use crate::memory::{make_room, refill};
+use crate::memory::{bytes, make_room, refill};
 use crate::options::{Options, Semantics};
 use crate::paper::{
     ALIKE, BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows,
@@ -26,16 +26,17 @@ use crate::simd::{Along, Groups, Simd, load_by_fours};
 pub(super) unsafe fn rows<S: Groups>(
     even: &EvenWindows,
     rows: &mut dyn Iterator<Item = (usize, &mut [u32])>,
+    scratch: &mut Scratch,
 ) -> Result<(), Error> {
     let Blocks { across, .. } = even.asked.blocks;
-    let mut concerned = Vec::new();
-    let mut image_rows = Rows::default();
+    let Scratch { concerned, rows: image_rows, candidates } = scratch;
     // SAFETY: as the caller's.
-    let noise = unsafe { Floats::<S::Widest>::splat(0.0) };
-    let mut found = Found { candidates: Vec::new(), number: 0, noise, exact: noise.0 };
+    let least_noise = unsafe { Floats::<S::Widest>::splat(even.asked.least_noise) };
+    let [noise, there, exact] = [least_noise; 3];
+    let mut found = Found { candidates, number: 0, least_noise, noise, there, exact };
     for (row, choices) in rows {
         let levels = &even.asked.levels[row * across..][..across];
-        make_room(&mut concerned, across)?;
+        make_room(concerned, across)?;
         concerned.extend((0..across).filter(|block| levels[*block] > 0));
         image_rows.read(even, row)?;
         for blocks in concerned.chunks(S::Widest::LANES) {
@@ -43,12 +44,28 @@ pub(super) unsafe fn rows<S: Groups>(
             // SAFETY: as the caller's.
             unsafe {
                 group.candidates(&mut found)?;
-                found.weigh(even.asked.least_noise);
+                found.weigh();
                 group.choose(&mut found, &image_rows.around(blocks), choices);
             }
         }
     }
     Ok(())
+}
+
+/// What one worker needs, kept from frame to frame.
+#[derive(Debug, Default)]
+pub(super) struct Scratch {
+    /// The columns of a row's blocks whose pixels can take windows.
+    concerned: Vec<usize>,
+    rows: Rows,
+    candidates: Vec<Candidates>,
+}
+
+impl Scratch {
+    /// Bytes held.
+    pub fn size(&self) -> usize {
+        bytes(&self.concerned) + self.rows.size() + bytes(&self.candidates)
+    }
 }
 
 /// Blocks of a row whose pixels can take windows, as many as there are lanes, or the last ones.
@@ -67,17 +84,31 @@ struct Lines<S: Simd> {
     from_own: Floats<S>,
 }
 
-/// Windows that the pixels of a group may take, one for each block.
-struct Candidates<S: Simd> {
+/// Windows that the pixels of a group may take, one for each block, in memory.
+#[derive(Clone, Copy, Debug)]
+struct Candidates {
     /// The blocks whose windows they are.
     places: [u32; LANES],
-    /// Their fields.
-    fields: [Floats<S>; FIELDS],
     /// The mask of the blocks that may take theirs.
-    may_take: S::F,
-    windows: Windows<S>,
+    may_take: Lanes,
+    /// As [`EvenWindow`] has them.
+    unevenness: Lanes,
+    per_noise: Lanes,
+    /// As [`Windows::store`] has them.
+    windows: [Lanes; WINDOW_FIELDS],
     /// What they cost a pixel of each block.
-    cost: Floats<S>,
+    cost: Lanes,
+}
+
+impl Candidates {
+    const NONE: Self = Candidates {
+        places: [0; LANES],
+        may_take: Lanes::ZERO,
+        unevenness: Lanes::ZERO,
+        per_noise: Lanes::ZERO,
+        windows: [Lanes::ZERO; WINDOW_FIELDS],
+        cost: Lanes::ZERO,
+    };
 }
 
 /// Windows, one for each block of a group.
@@ -94,8 +125,7 @@ struct Windows<S: Simd> {
     jitter: Floats<S>,
 }
 
-/// The fields of an [`EvenWindow`].
-const FIELDS: usize = size_of::<EvenWindow>() / size_of::<f32>();
+const WINDOW_FIELDS: usize = 9;
 
 /// Planes by their inverse depths at the blocks' middle pixels, and their changes per pixel to the right and down.
 #[derive(Clone, Copy)]
@@ -153,6 +183,36 @@ impl<S: Simd> Windows<S> {
         let [zero, even] = unsafe { [0.0, f32::INFINITY].map(|value| Floats::splat(value)) };
         let planes = Inclined { at_middle: zero, slope: [zero; 2] };
         Windows { middle: [zero; 2], radius: zero, planes, per_bend: zero, even, jitter: zero }
+    }
+
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn store(&self, to: &mut [Lanes; WINDOW_FIELDS]) {
+        let Windows { middle: [dx, dy], radius, planes, per_bend, even, jitter } = *self;
+        let Inclined { at_middle, slope: [across, down] } = planes;
+        let fields = [dx, dy, radius, at_middle, across, down, per_bend, even, jitter];
+        for i in 0..WINDOW_FIELDS {
+            // SAFETY: as the caller's; the array holds so many lanes.
+            unsafe { S::store(to[i].0.as_mut_ptr(), fields[i].0) };
+        }
+    }
+
+    /// Those that [`Windows::store`] stored.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn load(from: &[Lanes; WINDOW_FIELDS]) -> Self {
+        // SAFETY: as the caller's.
+        let mut fields = [unsafe { Floats::splat(0.0) }; WINDOW_FIELDS];
+        for i in 0..WINDOW_FIELDS {
+            // SAFETY: as the caller's.
+            fields[i].0 = unsafe { from[i].load::<S>() };
+        }
+        let [dx, dy, radius, at_middle, across, down, per_bend, even, jitter] = fields;
+        let planes = Inclined { at_middle, slope: [across, down] };
+        Windows { middle: [dx, dy], radius, planes, per_bend, even, jitter }
     }
 
     /// Takes the others of a mask.
@@ -213,17 +273,33 @@ impl<S: Simd> Pixels<S> {
 }
 
 /// The windows that the pixels of a group may take.
-struct Found<S: Simd> {
+struct Found<'a, S: Simd> {
     /// Only so many mean something.
-    candidates: Vec<Candidates<S>>,
+    candidates: &'a mut Vec<Candidates>,
     number: usize,
-    /// The least among them.
+    /// The least variance that is told from none, and the least among the windows.
+    least_noise: Floats<S>,
     noise: Floats<S>,
-    /// The mask of the blocks whose windows say that depths are exact.
-    exact: S::F,
+    /// How many windows the blocks may take, and how many of these say that depths are exact.
+    there: Floats<S>,
+    exact: Floats<S>,
 }
 
-impl<S: Along> Found<S> {
+impl<S: Along> Found<'_, S> {
+    /// Starts over.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn start(&mut self) {
+        self.number = 0;
+        // SAFETY: as the caller's.
+        unsafe {
+            self.noise = Floats::splat(f32::INFINITY);
+            [self.there, self.exact] = [Floats::splat(0.0); 2];
+        }
+    }
+
     /// Adds the windows of the blocks in these columns and rows, for the blocks of a mask.
     ///
     /// # Safety
@@ -236,36 +312,60 @@ impl<S: Along> Found<S> {
         rows: &Lines<S>,
         may_take: S::F,
     ) -> Result<(), Error> {
-        const { assert!(FIELDS == 8) };
+        const { assert!(size_of::<EvenWindow>() == size_of::<[f32; 8]>()) };
         let place = |lane: usize| columns.first[lane] + rows.first[lane];
         debug_assert!((0..S::LANES).all(|lane| place(lane) < windows.len()));
         let windows = windows.as_ptr();
         if self.number == self.candidates.len() {
             self.candidates.try_reserve(1)?;
-            // SAFETY: as the caller's.
-            let (zero, windows) = unsafe { (Floats::splat(0.0), Windows::none()) };
-            let (places, fields) = ([0; LANES], [zero; FIELDS]);
-            let none = Candidates { places, fields, may_take: zero.0, windows, cost: zero };
-            self.candidates.push(none);
+            self.candidates.push(Candidates::NONE);
         }
         let to = &mut self.candidates[self.number];
         self.number += 1;
         for lane in 0..S::LANES {
             to.places[lane] = place(lane) as u32;
         }
-        to.may_take = may_take;
-        to.windows.middle = [columns.from_own, rows.from_own];
-        for first in [0, 4] {
-            // SAFETY: as the caller's; a window is eight floats.
-            unsafe {
-                let window = |lane: usize| windows.add(to.places[lane] as usize);
-                let fields = load_by_fours::<S>(|lane| window(lane).cast::<f32>().add(first));
-                for i in 0..4 {
-                    to.fields[first + i] = Floats(fields[i]);
-                }
-            }
+        // SAFETY: as the caller's; a window is eight floats, and arrays hold so many lanes.
+        unsafe {
+            let window = |lane: usize| windows.add(to.places[lane] as usize).cast::<f32>();
+            let first = load_by_fours::<S>(window);
+            let last = load_by_fours::<S>(|lane| window(lane).add(4));
+            let [radius, inverse_depth, across, down] =
+                [Floats(first[0]), Floats(first[1]), Floats(first[2]), Floats(first[3])];
+            let [unevenness, noise, per_noise, per_bend] = last;
+            let (zero, one) = (S::splat(0.0), S::splat(1.0));
+            let middle @ [dx, dy] = [columns.from_own, rows.from_own];
+            let is_near = S::lt(dx.abs().max(dy.abs()).0, (radius + Floats::splat(REACH + 1.0)).0);
+            let may_take = S::and(may_take, S::and(is_near, S::lt(zero, radius.0)));
+            let at_middle = inverse_depth - across * dx - down * dy;
+            let planes = Inclined { at_middle, slope: [across, down] };
+            let steepness_squared = across * across + down * down;
+            let jitter = Floats::splat(JITTER) * steepness_squared.sqrt();
+            let (per_bend, even) = (Floats(per_bend), Floats(zero));
+            Windows { middle, radius, planes, per_bend, even, jitter }.store(&mut to.windows);
+            S::store(to.may_take.0.as_mut_ptr(), may_take);
+            S::store(to.unevenness.0.as_mut_ptr(), unevenness);
+            S::store(to.per_noise.0.as_mut_ptr(), per_noise);
+            self.noise.0 = S::select(may_take, S::min(noise, self.noise.0), self.noise.0);
+            let is_exact = S::and(
+                S::lt(noise, self.least_noise.0),
+                S::lt(self.least_noise.0, steepness_squared.0),
+            );
+            let one = S::and(may_take, one);
+            self.there = self.there + Floats(one);
+            self.exact = self.exact + Floats(S::and(is_exact, one));
         }
         Ok(())
+    }
+
+    /// The mask of the blocks whose windows say that depths are exact.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn is_exact(&self) -> S::F {
+        // SAFETY: as the caller's.
+        unsafe { S::lt((Floats::splat(EXACT_SHARE) * self.there).0, self.exact.0) }
     }
 
     /// Finds what the windows cost any pixel: all have been added.
@@ -273,40 +373,20 @@ impl<S: Along> Found<S> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn weigh(&mut self, least_noise: f32) {
-        // SAFETY: as the caller's.
-        unsafe {
-            let (zero, one) = (Floats::<S>::splat(0.0), S::splat(1.0));
-            let least_noise = Floats::<S>::splat(least_noise);
-            let (mut least, mut there, mut exact) = (Floats::splat(f32::INFINITY), zero, zero);
-            for to in &mut self.candidates[..self.number] {
-                let [radius, inverse_depth, across, down, _, noise, _, per_bend] = to.fields;
-                let [dx, dy] = to.windows.middle;
-                let is_near =
-                    S::lt(dx.abs().max(dy.abs()).0, (radius + Floats::splat(REACH + 1.0)).0);
-                to.may_take = S::and(to.may_take, S::and(is_near, S::lt(zero.0, radius.0)));
-                to.windows.radius = radius;
-                let at_middle = inverse_depth - across * dx - down * dy;
-                to.windows.planes = Inclined { at_middle, slope: [across, down] };
-                let steepness_squared = across * across + down * down;
-                to.windows.jitter = Floats::splat(JITTER) * steepness_squared.sqrt();
-                to.windows.per_bend = per_bend;
-                least.0 = S::select(to.may_take, S::min(noise.0, least.0), least.0);
-                let is_exact = S::and(
-                    S::lt(noise.0, least_noise.0),
-                    S::lt(least_noise.0, steepness_squared.0),
-                );
-                let one = S::and(to.may_take, one);
-                there = there + Floats(one);
-                exact = exact + Floats(S::and(is_exact, one));
-            }
-            self.exact = S::lt((Floats::splat(EXACT_SHARE) * there).0, exact.0);
-            self.noise = least.max(least_noise);
-            for to in &mut self.candidates[..self.number] {
-                let [_, _, _, _, unevenness, _, per_noise, per_bend] = to.fields;
-                let misfit = (unevenness - self.noise).max(zero);
-                let even = self.noise * per_noise + Floats::splat(MISFIT) * misfit * per_bend;
-                to.windows.even = Floats(S::select(to.may_take, even.0, S::splat(f32::INFINITY)));
+    unsafe fn weigh(&mut self) {
+        self.noise = self.noise.max(self.least_noise);
+        for to in &mut self.candidates[..self.number] {
+            // SAFETY: as the caller's.
+            unsafe {
+                let unevenness = Floats::<S>(to.unevenness.load::<S>());
+                let per_noise = Floats(to.per_noise.load::<S>());
+                let mut windows = Windows::load(&to.windows);
+                let misfit = (unevenness - self.noise).max(Floats::splat(0.0));
+                let misfit = Floats::splat(MISFIT) * misfit * windows.per_bend;
+                let even = self.noise * per_noise + misfit;
+                let may_take = to.may_take.load::<S>();
+                windows.even.0 = S::select(may_take, even.0, S::splat(f32::INFINITY));
+                windows.store(&mut to.windows);
             }
         }
     }
@@ -326,23 +406,26 @@ impl<S: Along> Found<S> {
             let mut best = S::splat(-1.0);
             let mut windows = Windows::none();
             for (number, candidates) in found.iter_mut().enumerate() {
-                let cost = candidates.windows.cost(pixels, noise);
-                candidates.cost = cost;
+                let these = Windows::load(&candidates.windows);
+                let cost = these.cost(pixels, noise);
+                S::store(candidates.cost.0.as_mut_ptr(), cost.0);
                 let better = S::lt(cost.0, least.0);
                 least.0 = S::select(better, (alike * cost).0, least.0);
                 best = S::select(better, S::splat(number as f32), best);
-                windows.take(better, &candidates.windows);
+                windows.take(better, &these);
             }
             // By chance the pixel may be nearer to the plane beyond a crease.
             least = Floats::splat(CREASE_COST) * least;
             let first = windows;
             for (number, candidates) in found.iter().enumerate() {
-                let is_better = S::lt(candidates.cost.0, least.0);
-                let crease = Crease::between(&candidates.windows, &first, noise);
+                let these = Windows::load(&candidates.windows);
+                let cost = Floats(candidates.cost.load::<S>());
+                let is_better = S::lt(cost.0, least.0);
+                let crease = Crease::between(&these, &first, noise);
                 let better = S::and(is_better, crease.is_first_side(pixels.at));
-                least.0 = S::select(better, (alike * candidates.cost).0, least.0);
+                least.0 = S::select(better, (alike * cost).0, least.0);
                 best = S::select(better, S::splat(number as f32), best);
-                windows.take(better, &candidates.windows);
+                windows.take(better, &these);
             }
             (Floats(best), windows)
         }
@@ -355,7 +438,7 @@ impl Group<'_> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn candidates<S: Along>(&self, found: &mut Found<S>) -> Result<(), Error> {
+    unsafe fn candidates<S: Along>(&self, found: &mut Found<'_, S>) -> Result<(), Error> {
         let &Group { even, row, blocks, .. } = self;
         let Blocks { across, down, .. } = even.asked.blocks;
         let &Cloud { width, height, .. } = even.cloud;
@@ -368,9 +451,9 @@ impl Group<'_> {
             radii.0[lane] = even.asked.largest(own) as f32;
             column.0[lane] = *block as f32;
         }
-        found.number = 0;
         // SAFETY: as the caller's; all places are inside the image.
         unsafe {
+            found.start();
             let zero = Floats::<S>::splat(0.0);
             let levels = levels.load::<S>();
             let mut radii = Floats::<S>(radii.load::<S>());
@@ -412,7 +495,7 @@ impl Group<'_> {
     #[inline(always)]
     unsafe fn choose<S: Along>(
         &self,
-        found: &mut Found<S>,
+        found: &mut Found<'_, S>,
         around: &Around<S>,
         choices: &mut [u32],
     ) {
@@ -479,7 +562,7 @@ impl Group<'_> {
     #[inline(always)]
     unsafe fn pixels<S: Along>(
         &self,
-        found: &Found<S>,
+        found: &Found<'_, S>,
         around: &Around<S>,
         number: usize,
     ) -> Pixels<S> {
@@ -488,7 +571,7 @@ impl Group<'_> {
         unsafe {
             let depth = around.depths[place[1]][place[0]];
             let clean = around.clean[place[1]][place[0]];
-            let noisy = S::and_not(found.exact, S::lt(S::splat(0.0), clean));
+            let noisy = S::and_not(found.is_exact(), S::lt(S::splat(0.0), clean));
             Pixels {
                 number: Floats::splat(number as f32),
                 at: [from_middle(place[0]), from_middle(place[1])],
@@ -622,7 +705,7 @@ const AROUND: usize = BLOCK + 2;
 const READ: usize = AROUND.next_multiple_of(4);
 
 /// The rows of the image around a row of blocks.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Rows {
     /// Elements of a row: a column before the image's, and room behind it for what is read of the last block.
     length: usize,
@@ -641,6 +724,11 @@ struct Around<S: Simd> {
 }
 
 impl Rows {
+    /// Bytes held.
+    fn size(&self) -> usize {
+        bytes(&self.inverse_depths) + bytes(&self.depths) + bytes(&self.clean)
+    }
+
     /// Becomes those around another row of blocks.
     #[inline(always)]
     fn read(&mut self, even: &EvenWindows, row: usize) -> Result<(), Error> {

@@ -47,6 +47,11 @@ pub(crate) fn rows_of_rings(reach: usize, height: usize) -> usize {
     (2 * reach + 3).min(height + 2)
 }
 
+/// Elements of rings of so many columns and rows.
+pub(crate) fn elements_of_rings(columns: usize, rows: usize) -> usize {
+    rows * stride(columns)
+}
+
 /// Elements from a row of rings of so many columns to the next.
 #[inline(always)]
 fn stride(columns: usize) -> usize {
@@ -62,11 +67,10 @@ impl<const N: usize> Rings<N> {
         self.sums.size() + self.points.size()
     }
 
-    /// Makes room for so many columns and rows.
-    pub fn reserve(&mut self, columns: usize, rows: usize) -> Result<(), Error> {
-        let length = rows * stride(columns);
-        self.points.grow(length + BLOCK * GROUP)?;
-        self.sums.grow(length)
+    /// Makes room for so many elements.
+    pub fn reserve(&mut self, elements: usize) -> Result<(), Error> {
+        self.points.grow(elements + BLOCK * GROUP)?;
+        self.sums.grow(elements)
     }
 
     /// Starts over at row `top` of a layer's points, with rings of so many rows; there is room.

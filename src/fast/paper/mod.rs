@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use depths::row_length;
 use even_windows::EvenTile;
 use found::FoundRow;
-use integrals::{Rings, reached, rows_of_rings};
+use integrals::{Rings, elements_of_rings, reached, rows_of_rings};
 use layers::{Layer, Waiting};
 use methods::{CovarianceMatrix, Gradients, MOMENTS, SmoothedDepthChanges};
 use tile::Tile;
@@ -43,6 +43,10 @@ const MOST_INDICES: usize = 1 << 24;
 
 /// Rows of a tile: windows reach farther than PCL's, and more rows around it are summed again for the next one.
 const TILE_ROWS: usize = 256;
+
+/// There is room for windows of this radius from the first frame on, if they are asked for. (Those of larger ones may take
+/// hundreds of megabytes.)
+const ROOMY_RADIUS: usize = 64;
 
 /// Bytes of a tile's rings. Eight windows' corners move along them from group to group, which needs no more than a few
 /// of the rows' cache lines at a time: narrow tiles cost more, in pixels around them that are summed twice.
@@ -73,6 +77,7 @@ pub(crate) struct WorkerScratch {
     gradients: Rings<8>,
     depth_changes: Rings<4>,
     waiting: Waiting,
+    choices: choices::Scratch,
 }
 
 impl WorkerScratch {
@@ -83,6 +88,7 @@ impl WorkerScratch {
             + self.gradients.size()
             + self.depth_changes.size()
             + self.waiting.size()
+            + self.choices.size()
     }
 }
 
@@ -194,8 +200,9 @@ pub(crate) fn even_windows(
     let needed_blocks = (0..blocks.count()).filter(|block| needed[*block]);
     let largest = needed_blocks.map(radius).max().unwrap_or(0) as usize;
     let grid = Grid::new(cloud.width, cloud.height, largest, Rings::<MOMENTS>::COLUMN);
+    let room = grid.room(asked.limit);
     for scratch in &each[..workers.count()] {
-        grid.reserve(&mut lock(scratch).paper.moments)?;
+        lock(scratch).paper.moments.reserve(room)?;
     }
     workers.for_each(grid.count(), |worker, item| {
         let Some((columns, rows)) = grid.tile(item) else { return };
@@ -212,11 +219,15 @@ pub(crate) fn choices(
     isa: Isa,
     even: &EvenWindows,
     choices: &mut [u32],
-    workers: &Workers,
+    scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
+    let super::Scratch { workers, each, .. } = scratch;
     let rows = choices.chunks_mut(BLOCK * even.cloud.width).enumerate();
-    // SAFETY: the processor has the instruction set.
-    workers.share(rows, |_, rows| unsafe { paths::run(isa, ChoicesTask { even, rows }) })
+    workers.share(rows, |worker, rows| {
+        let scratch = &mut lock(&each[worker]).paper.choices;
+        // SAFETY: the processor has the instruction set.
+        unsafe { paths::run(isa, ChoicesTask { even, rows, scratch }) }
+    })
 }
 
 /// Image rows that are swept together, with the rows around them whose depth changes reach them.
@@ -257,6 +268,8 @@ struct Grid {
     height: usize,
     /// How far windows reach from their pixels.
     reach: usize,
+    /// Bytes of a column in a row of the rings.
+    column: usize,
     /// Of a tile.
     columns: usize,
     rows: usize,
@@ -274,17 +287,23 @@ impl Grid {
         let columns = width.div_ceil(across).next_multiple_of(BLOCK * GROUP);
         let down = height.div_ceil(TILE_ROWS);
         let rows = height.div_ceil(down).next_multiple_of(BLOCK);
-        Grid { width, height, reach, columns, rows, across, down }
+        Grid { width, height, reach, column, columns, rows, across, down }
     }
 
     fn count(&self) -> usize {
         self.across * self.down
     }
 
-    /// Makes room for the tiles.
-    fn reserve<const N: usize>(&self, rings: &mut Rings<N>) -> Result<(), Error> {
-        let columns = (self.columns + 2 * self.reach).min(self.width);
-        rings.reserve(columns, rows_of_rings(self.reach, self.height))
+    /// Elements of the rings that there is to be room for: those of the tiles, and of tiles for smaller windows, or larger
+    /// ones up to `limit`.
+    fn room(&self, limit: u32) -> usize {
+        let &Grid { width, height, reach, column, .. } = self;
+        let most = reach.max(ROOMY_RADIUS.min(limit as usize));
+        let elements = |reach: usize| {
+            let columns = Grid::new(width, height, reach, column).columns + 2 * reach;
+            elements_of_rings(columns.min(width), rows_of_rings(reach, height))
+        };
+        (0..=most).map(elements).max().expect("a radius")
     }
 
     /// The columns and rows of a tile, which start with a block; none where the tiles before have covered all.
@@ -412,14 +431,15 @@ impl<'a> Job<'a> {
             (&depths[y * length..][..length], &radii[at..at + radii_length])
         };
         let grid = Grid::new(width, height, largest, column(options.method));
+        let room = grid.room(options.paper.largest_radius);
         for scratch in &each[..workers.count()] {
             let WorkerScratch { moments, gradients, depth_changes, waiting, .. } =
                 &mut lock(scratch).paper;
-            waiting.reserve(grid.columns.div_ceil(step), grid.rows.div_ceil(step))?;
+            waiting.reserve(width.div_ceil(step), grid.rows.div_ceil(step))?;
             match options.method {
-                Method::CovarianceMatrix => grid.reserve(moments)?,
-                Method::AverageDepthChange => grid.reserve(depth_changes)?,
-                Method::Average3DGradient | Method::Simple3DGradient => grid.reserve(gradients)?,
+                Method::CovarianceMatrix => moments.reserve(room)?,
+                Method::AverageDepthChange => depth_changes.reserve(room)?,
+                Method::Average3DGradient | Method::Simple3DGradient => gradients.reserve(room)?,
             }
         }
         workers.for_each(grid.count(), |worker, item| {
@@ -601,6 +621,7 @@ impl Task for EvenTask<'_, '_> {
 struct ChoicesTask<'a, 'c> {
     even: &'a EvenWindows<'a>,
     rows: &'a mut dyn Iterator<Item = (usize, &'c mut [u32])>,
+    scratch: &'a mut choices::Scratch,
 }
 
 impl Task for ChoicesTask<'_, '_> {
@@ -609,6 +630,6 @@ impl Task for ChoicesTask<'_, '_> {
     #[inline(always)]
     unsafe fn run<S: Groups>(self) -> Result<(), Error> {
         // SAFETY: as the caller's.
-        unsafe { choices::rows::<S>(self.even, self.rows) }
+        unsafe { choices::rows::<S>(self.even, self.rows, self.scratch) }
     }
 }
