@@ -8,7 +8,7 @@ use crate::fast::moments::{Matrices, WindowMoments, sum_of_moments};
 use crate::fast::run::{Noted, OfRun};
 use crate::fast::tile::{Bits, Found};
 use crate::paper::{CleanPoints, ROUNDING, Rect};
-use crate::simd::{GROUP, Groups, Simd};
+use crate::simd::{GROUP, Groups, Simd, load_by_fours};
 
 /// A method's sums and normals.
 pub(crate) trait Sums<const N: usize>: Channels<N> {
@@ -183,11 +183,8 @@ pub(crate) unsafe fn gather<S: Groups>(
     let points = points.as_ptr();
     // SAFETY: as the caller's; a point is four floats.
     unsafe {
-        let mut rows = [S::splat(0.0); 4];
-        for i in 0..4 {
-            rows[i] = S::load_fours(|four| points.add(places[i + 4 * four] as usize).cast());
-        }
-        let [x, y, z, count] = S::transpose_fours(rows);
+        let place = |lane: usize| points.add(places[lane] as usize).cast();
+        let [x, y, z, count] = load_by_fours::<S>(place);
         [Floats(x), Floats(y), Floats(z), Floats(count)]
     }
 }
