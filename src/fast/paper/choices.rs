@@ -10,7 +10,7 @@ use crate::fast::arithmetic::Floats;
 use crate::fast::lanes::{LANES, Lanes};
 use crate::fast::tile::Bits;
 use crate::fast::windows::threshold;
-use crate::memory::{bytes, make_room, refill};
+use crate::memory::{bytes, make_room, refill, resize};
 use crate::options::{Options, Semantics};
 use crate::paper::{
     ALIKE, BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows,
@@ -30,6 +30,9 @@ pub(super) unsafe fn rows<S: Groups>(
 ) -> Result<(), Error> {
     let Blocks { across, .. } = even.asked.blocks;
     let Scratch { concerned, rows: image_rows, candidates } = scratch;
+    // A block's own and those around it, for as many radii as the largest can be halved to.
+    let most = 1 + PLACES.len() * (1 + even.asked.limit.ilog2() as usize);
+    resize(candidates, most, Candidates::NONE)?;
     // SAFETY: as the caller's.
     let least_noise = unsafe { Floats::<S::Widest>::splat(even.asked.least_noise) };
     let [noise, there, exact] = [least_noise; 3];
@@ -43,7 +46,7 @@ pub(super) unsafe fn rows<S: Groups>(
             let group = Group { even, row, blocks };
             // SAFETY: as the caller's.
             unsafe {
-                group.candidates(&mut found)?;
+                group.candidates(&mut found);
                 found.weigh();
                 group.choose(&mut found, &image_rows.around(blocks), choices);
             }
@@ -275,7 +278,7 @@ impl<S: Simd> Pixels<S> {
 /// The windows that the pixels of a group may take.
 struct Found<'a, S: Simd> {
     /// Only so many mean something.
-    candidates: &'a mut Vec<Candidates>,
+    candidates: &'a mut [Candidates],
     number: usize,
     /// The least variance that is told from none, and the least among the windows.
     least_noise: Floats<S>,
@@ -311,15 +314,11 @@ impl<S: Along> Found<'_, S> {
         columns: &Lines<S>,
         rows: &Lines<S>,
         may_take: S::F,
-    ) -> Result<(), Error> {
+    ) {
         const { assert!(size_of::<EvenWindow>() == size_of::<[f32; 8]>()) };
         let place = |lane: usize| columns.first[lane] + rows.first[lane];
         debug_assert!((0..S::LANES).all(|lane| place(lane) < windows.len()));
         let windows = windows.as_ptr();
-        if self.number == self.candidates.len() {
-            self.candidates.try_reserve(1)?;
-            self.candidates.push(Candidates::NONE);
-        }
         let to = &mut self.candidates[self.number];
         self.number += 1;
         for lane in 0..S::LANES {
@@ -355,7 +354,6 @@ impl<S: Along> Found<'_, S> {
             self.there = self.there + Floats(one);
             self.exact = self.exact + Floats(S::and(is_exact, one));
         }
-        Ok(())
     }
 
     /// The mask of the blocks whose windows say that depths are exact.
@@ -438,7 +436,7 @@ impl Group<'_> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn candidates<S: Along>(&self, found: &mut Found<'_, S>) -> Result<(), Error> {
+    unsafe fn candidates<S: Along>(&self, found: &mut Found<'_, S>) {
         let &Group { even, row, blocks, .. } = self;
         let Blocks { across, down, .. } = even.asked.blocks;
         let &Cloud { width, height, .. } = even.cloud;
@@ -464,7 +462,7 @@ impl Group<'_> {
             let columns = Axis { pixels: width, blocks: across, number: 1 };
             let rows = Axis { pixels: height, blocks: down, number: across };
             let own = [columns.lines::<S>(column, column), rows.lines(row, row)];
-            found.add(even.windows, &own[0], &own[1], takes_any)?;
+            found.add(even.windows, &own[0], &own[1], takes_any);
             loop {
                 let may_take = S::and(S::lt(zero.0, radii.0), S::lt(S::splat(level), levels));
                 if S::bits(may_take) == 0 {
@@ -479,13 +477,12 @@ impl Group<'_> {
                 let across = [&left, &own[0], &right];
                 let down = [&above, &own[1], &below];
                 for (column, row) in PLACES {
-                    found.add(even.windows, across[column], down[row], may_take)?;
+                    found.add(even.windows, across[column], down[row], may_take);
                 }
                 radii = Floats(S::truncate((radii * Floats::splat(0.5)).0));
                 level += 1.0;
             }
         }
-        Ok(())
     }
 
     /// Of the windows `found`, those that the blocks' pixels take, for the choices of their rows.
