@@ -11,7 +11,7 @@ use clouds::{
     Cloud, Kind, Random, assert_same_bits, compute, compute_listed, compute_to, edge_options,
     fast_isas, methods, options, paper_options,
 };
-use iine::{BorderPolicy, DistanceMetric, Error, Estimator, Isa, Method, Normals, Options};
+use iine::{BorderPolicy, DistanceMetric, Error, Estimator, Isa, Method, Options};
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
@@ -172,6 +172,17 @@ fn a_frame_may_be_deeper_than_the_one_before() {
     }
 }
 
+/// Computes a frame; gives the bytes of scratch memory after it, and how often this thread has allocated during it.
+fn memory_of_frame(
+    estimator: &mut Estimator,
+    cloud: &Cloud,
+    found: &mut [[f32; 4]],
+) -> (usize, usize) {
+    let before = ALLOCATIONS.with(Cell::get);
+    compute_to(found, estimator, cloud).unwrap();
+    (estimator.scratch_size(), ALLOCATIONS.with(Cell::get) - before)
+}
+
 /// The method that needs the most memory.
 const LARGEST_RINGS: (Method, BorderPolicy) = (Method::CovarianceMatrix, BorderPolicy::Ignore);
 
@@ -193,16 +204,8 @@ fn scratch_memory_is_small_and_stays() {
                     options.threads = threads;
                     let mut estimator = Estimator::new(options);
                     assert_eq!(estimator.scratch_size(), 0);
-                    let mut frame = || {
-                        let data = found.as_flattened_mut();
-                        let mut normals =
-                            Normals::interleaved(data, width, height, 4, 0, Some(3)).unwrap();
-                        let before = ALLOCATIONS.with(Cell::get);
-                        estimator.compute(&cloud.view(), &mut normals).unwrap();
-                        (estimator.scratch_size(), ALLOCATIONS.with(Cell::get) - before)
-                    };
-                    let (first, _) = frame();
-                    let (second, allocations) = frame();
+                    let (first, _) = memory_of_frame(&mut estimator, &cloud, &mut found);
+                    let (second, allocations) = memory_of_frame(&mut estimator, &cloud, &mut found);
                     println!(
                         "{width}x{height} {method:?} smoothing {smoothing} threads {threads}: {first} bytes, {:.2} \
                          a pixel",
@@ -237,16 +240,10 @@ fn only_the_first_frame_allocates() {
         options.threads = 1;
         let what = format!("{options:?}");
         let mut estimator = Estimator::new(options);
-        let mut frame = |cloud: &Cloud| {
-            let data = found.as_flattened_mut();
-            let mut normals = Normals::interleaved(data, width, height, 4, 0, Some(3)).unwrap();
-            let before = ALLOCATIONS.with(Cell::get);
-            estimator.compute(&cloud.view(), &mut normals).unwrap();
-            (estimator.scratch_size(), ALLOCATIONS.with(Cell::get) - before)
-        };
-        let (size, _) = frame(&frames[0]);
-        for again in [&frames[0], &frames[1]] {
-            assert_eq!(frame(again), (size, 0), "{what}");
+        let (size, _) = memory_of_frame(&mut estimator, &frames[0], &mut found);
+        for again in &frames {
+            let memory = memory_of_frame(&mut estimator, again, &mut found);
+            assert_eq!(memory, (size, 0), "{what}");
         }
     }
 }

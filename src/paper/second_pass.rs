@@ -107,9 +107,18 @@ impl SecondPass {
         }
         let blocks = Blocks::of(cloud.width, cloud.height);
         self.concern(cloud, &blocks, options, engine.workers())?;
-        let SecondPass { concerned, wanted, levels, depth_changes, needed, .. } = self;
-        let (windows, choices) = (&mut self.windows, &mut self.choices);
-        let (taken, second) = (&mut self.taken, &mut self.second);
+        let SecondPass {
+            concerned,
+            wanted,
+            levels,
+            depth_changes,
+            needed,
+            windows,
+            choices,
+            taken,
+            second,
+            ..
+        } = self;
         find_depth_changes(depth_changes, cloud, options, engine.workers())?;
         depth_changes.drop_explained(cloud, engine.workers());
         let clean = depth_changes.clean_radii(cloud.width, cloud.height)?;

@@ -499,9 +499,10 @@ impl Group<'_> {
         let width = self.even.cloud.width;
         // SAFETY: as the caller's.
         unsafe {
-            let mut pixels = [self.pixels(found, around, 0); BLOCK * BLOCK];
+            let exact = found.is_exact();
+            let mut pixels = [self.pixels(exact, around, 0); BLOCK * BLOCK];
             for number in 1..BLOCK * BLOCK {
-                pixels[number] = self.pixels(found, around, number);
+                pixels[number] = self.pixels(exact, around, number);
             }
             let mut first = pixels[MIDDLE * BLOCK + MIDDLE];
             for other in &pixels {
@@ -552,23 +553,18 @@ impl Group<'_> {
         }
     }
 
-    /// The pixels of a number in the blocks.
+    /// The pixels of a number in the blocks; `exact` as [`Found::is_exact`] has it.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn pixels<S: Along>(
-        &self,
-        found: &Found<'_, S>,
-        around: &Around<S>,
-        number: usize,
-    ) -> Pixels<S> {
+    unsafe fn pixels<S: Along>(&self, exact: S::F, around: &Around<S>, number: usize) -> Pixels<S> {
         let place = [number % BLOCK, number / BLOCK];
         // SAFETY: as the caller's.
         unsafe {
             let depth = around.depths[place[1]][place[0]];
             let clean = around.clean[place[1]][place[0]];
-            let noisy = S::and_not(found.is_exact(), S::lt(S::splat(0.0), clean));
+            let noisy = S::and_not(exact, S::lt(S::splat(0.0), clean));
             Pixels {
                 number: Floats::splat(number as f32),
                 at: [from_middle(place[0]), from_middle(place[1])],
