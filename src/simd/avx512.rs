@@ -119,6 +119,13 @@ impl Groups for Avx512 {
         }
     }
     #[inline(always)]
+    unsafe fn store_fours_d(value: Self::D, place: impl Fn(usize) -> *mut f64) {
+        unsafe {
+            _mm256_storeu_pd(place(0), _mm512_castpd512_pd256(value));
+            _mm256_storeu_pd(place(1), _mm512_extractf64x4_pd::<1>(value));
+        }
+    }
+    #[inline(always)]
     unsafe fn transpose_fours_d([a, b, c, d]: [Self::D; 4]) -> [Self::D; 4] {
         unsafe {
             let (ab_even, cd_even) = (_mm512_unpacklo_pd(a, b), _mm512_unpacklo_pd(c, d));

@@ -235,6 +235,8 @@ pub(crate) trait Groups: Along {
 
     /// As [`Along::load_fours`].
     unsafe fn load_fours_d(place: impl Fn(usize) -> *const f64) -> Self::D;
+    /// Stores the first four lanes to the first place, and the last four to the next one.
+    unsafe fn store_fours_d(value: Self::D, place: impl Fn(usize) -> *mut f64);
     /// As [`Along::transpose_fours`].
     unsafe fn transpose_fours_d(rows: [Self::D; 4]) -> [Self::D; 4];
 

@@ -373,6 +373,12 @@ impl Groups for Neon {
         }
     }
     #[inline(always)]
+    unsafe fn store_fours_d(value: Self::D, place: impl Fn(usize) -> *mut f64) {
+        for (i, two) in value.into_iter().enumerate() {
+            unsafe { vst1q_f64(place(i / 2).add(i % 2 * 2), two) };
+        }
+    }
+    #[inline(always)]
     unsafe fn transpose_fours_d(rows: [Self::D; 4]) -> [Self::D; 4] {
         let [a, b, c, d] = rows;
         let mut columns = rows;

@@ -291,6 +291,14 @@ impl Groups for Portable {
         unsafe { load_fours(place) }
     }
     #[inline(always)]
+    unsafe fn store_fours_d(value: D, place: impl Fn(usize) -> *mut f64) {
+        let (fours, _) = value.as_chunks::<4>();
+        for (half, four) in fours.iter().enumerate() {
+            // SAFETY: promised by the caller.
+            unsafe { place(half).cast::<[f64; 4]>().write_unaligned(*four) };
+        }
+    }
+    #[inline(always)]
     unsafe fn transpose_fours_d(rows: [D; 4]) -> [D; 4] {
         transpose_fours(rows)
     }

@@ -154,6 +154,10 @@ unsafe fn of_groups<S: Groups>(a: &[f32; 16], b: &[f32; 16]) -> Results {
             ),
             S::last_d(dx),
         ]);
+        let mut fours = [0.0; 10];
+        let first = fours.as_mut_ptr();
+        S::store_fours_d(dx, |half| first.add(1 + 5 * half));
+        results.doubles::<S>([S::load_d(fours.as_ptr()), S::load_d(fours.as_ptr().add(2))]);
         results.doubles::<S>(S::transpose_fours_d([dx, dy, S::add_d(dx, dx), S::add_d(dy, dy)]));
         let rows = [0, 1, 2, 3, 4, 5, 6, 7].map(|row| S::load_d(doubles.as_ptr().add(row)));
         results.doubles::<S>(S::transpose_d(rows));

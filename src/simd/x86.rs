@@ -351,6 +351,12 @@ impl Groups for Sse2 {
         }
     }
     #[inline(always)]
+    unsafe fn store_fours_d(value: Self::D, place: impl Fn(usize) -> *mut f64) {
+        for (i, two) in value.into_iter().enumerate() {
+            unsafe { _mm_storeu_pd(place(i / 2).add(i % 2 * 2), two) };
+        }
+    }
+    #[inline(always)]
     unsafe fn transpose_fours_d(rows: [Self::D; 4]) -> [Self::D; 4] {
         let [a, b, c, d] = rows;
         let mut columns = rows;
@@ -657,6 +663,12 @@ impl Groups for Avx2 {
     #[inline(always)]
     unsafe fn load_fours_d(place: impl Fn(usize) -> *const f64) -> Self::D {
         unsafe { [_mm256_loadu_pd(place(0)), _mm256_loadu_pd(place(1))] }
+    }
+    #[inline(always)]
+    unsafe fn store_fours_d(value: Self::D, place: impl Fn(usize) -> *mut f64) {
+        for (half, four) in value.into_iter().enumerate() {
+            unsafe { _mm256_storeu_pd(place(half), four) };
+        }
     }
     #[inline(always)]
     unsafe fn transpose_fours_d(rows: [Self::D; 4]) -> [Self::D; 4] {

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::integrals::{Rings, reached, rows_of_rings};
 use super::layers::{Layer, with_fraction};
 use super::methods::{CovarianceMatrix, MOMENTS};
-use super::rects::{Place, Rects, STEPS, range};
+use super::rects::{Pixels, Rects, range};
 use crate::fast::Parts;
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::fast::tile::Bits;
@@ -128,9 +128,11 @@ impl EvenTile<'_> {
             let row = middle(y, BLOCK, height);
             while next < (row + reach + 1).min(bottom) {
                 rings.read_positions(&depths[next * width..], next);
-                rings.push(&moments, next);
+                // SAFETY: as the caller's.
+                unsafe { rings.push::<S>(&moments, next) };
                 next += 1;
             }
+            rings.aim(row, reach, 0, height);
             let total = rings.total(next - 1);
             for x in self.columns.clone().step_by(GROUP * BLOCK) {
                 let block = self.asked.blocks.block(y * width + x);
@@ -274,14 +276,11 @@ impl EvenTile<'_> {
         radii: Floats<S>,
         lanes: u32,
     ) -> (Fits<S>, u32) {
-        let (left, stride, rows) = (rings.left(), rings.stride(), rings.rows);
-        let image = [self.cloud.width, self.cloud.height];
-        let place = Place { image, x, y, step: BLOCK, left, stride, rows };
-        let (_, sums) = rings.parts();
+        let pixels = Pixels { x, step: BLOCK, width: self.cloud.width };
         // SAFETY: as the caller's.
         unsafe {
-            let rects = Rects::new::<S, MOMENTS>(&place, radii.0, false, false);
-            let [sx, sy, sr, n, xx, yy, rr, _, xy, yr, xr, _] = rects.sums::<S, MOMENTS>(sums);
+            let rects = Rects::new::<S, MOMENTS>(rings, &pixels, radii, lanes);
+            let [sx, sy, sr, n, xx, yy, rr, xy, yr, xr, ..] = rects.sums::<S, MOMENTS>(rings, 0);
             let share = Doubles::splat(1.0) / n;
             let (mx, my, mr) = (sx * share, sy * share, sr * share);
             let (xx, xy, yy) = (xx - sx * mx, xy - sx * my, yy - sy * my);
@@ -298,7 +297,7 @@ impl EvenTile<'_> {
             let chance = Floats::splat(1.0) + Floats::splat(CHANCE) * chance.sqrt();
             let noise = unevenness * chance.widen();
             // The pixels' own positions.
-            let column = columns::<S>(x, self.cloud.width).widen();
+            let column = pixels.columns().widen();
             let [origin_x, origin_y, origin_r, _] = moments.origin.map(|o| Doubles::splat(o));
             let across = column - origin_x - mx;
             let down = Doubles::splat(y as f64) - origin_y - my;
@@ -324,27 +323,14 @@ impl EvenTile<'_> {
         let [a, b] = fits.slope;
         // SAFETY: as the caller's.
         unsafe {
-            let row = Floats::splat(y as f32);
             let &Cloud { width, height, .. } = self.cloud;
-            let area = side(columns(x, width), radii, width) * side(row, radii, height);
+            let columns = Pixels { x, step: BLOCK, width }.columns();
+            let area = side(columns, radii, width) * side(Floats::splat(y as f32), radii, height);
             let steep = Doubles::splat(JAGGED * JAGGED) * (a * a + b * b);
             let fewest = Doubles::splat(JAGGED_POINTS) * area.widen();
             let least = Doubles::splat(self.asked.least_noise.into());
             !steep.lt(fits.unevenness) & !steep.lt(least) & !fits.points.lt(fewest)
         }
-    }
-}
-
-/// The columns of eight blocks' middle pixels, from column `x` on, in an image of this width.
-///
-/// # Safety
-/// The processor has the instruction set of `S`.
-#[inline(always)]
-unsafe fn columns<S: Groups>(x: usize, width: usize) -> Floats<S> {
-    // SAFETY: as the caller's.
-    unsafe {
-        let steps = Floats::<S>::load(STEPS.as_ptr()) * Floats::splat(BLOCK as f32);
-        Floats(S::min((steps + Floats::splat(x as f32)).0, S::splat((width - 1) as f32)))
     }
 }
 
@@ -355,6 +341,6 @@ unsafe fn columns<S: Groups>(x: usize, width: usize) -> Floats<S> {
 #[inline(always)]
 unsafe fn side<S: Groups>(at: Floats<S>, radii: Floats<S>, count: usize) -> Floats<S> {
     // SAFETY: as the caller's.
-    let [start, end] = unsafe { range::<S>(at.0, radii.0, 0.0, count as f32) };
-    Floats(end) - Floats(start)
+    let [start, end] = unsafe { range(at, radii, count) };
+    end - start
 }

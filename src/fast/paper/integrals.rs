@@ -3,32 +3,49 @@
 use std::ops::Range;
 
 use super::layers::Layer;
+use super::rects::Rows;
 use crate::Error;
 use crate::cloud::Points;
+use crate::fast::arithmetic::{Doubles, Floats};
 use crate::fast::buffer::Buffer;
-use crate::fast::lanes::transpose4;
+use crate::fast::lanes::LANES;
+use crate::memory::bytes;
 use crate::paper::{BLOCK, inverse_depth};
-use crate::simd::{GROUP, Groups};
+use crate::simd::{Along, GROUP, Groups};
 
-/// x, y, z, and the weight: 1, or next to nothing for a hidden point (`layers`); zeros for a missing one.
+/// x, y, z, and the weight: 1, or next to nothing for a hidden point (`layers`); 0 for a missing one, whose coordinates are
+/// NaN.
 pub(crate) type Counted = [f32; 4];
+
+/// Number of the weights' plane.
+pub(crate) const WEIGHT: usize = 3;
+
+/// Columns before and after a row's own, so that the pixels next to a group need no special case.
+pub(crate) const MARGIN: usize = GROUP;
 
 /// What is summed: `N` channels of a pixel.
 pub(crate) trait Channels<const N: usize> {
-    /// The channels of a pixel, from its point and those to the left, to the right, above and below.
-    fn of(&self, own: &Counted, row: [&Counted; 2], column: [&Counted; 2]) -> [f64; N];
+    /// The channels of eight pixels.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    unsafe fn of<S: Groups>(&self, points: &Around) -> [Doubles<S>; N];
 }
 
-/// Both rings, over a tile's columns.
+/// Both rings, over a tile's columns; in a row, a margin comes before them.
 #[derive(Debug, Default)]
 pub(crate) struct Rings<const N: usize> {
-    /// Element i of a row is the sum over the columns before the i-th.
-    sums: Buffer<[f64; N]>,
-    /// Element i + 1 of a row is the point of the i-th column; the first and those after the last are missing points.
-    points: Buffer<Counted>,
+    /// Of the columns up to this one and the rows up to this one: eight channels, which are a line of the cache, and four
+    /// that are left.
+    eights: Buffer<[f64; 8]>,
+    fours: Buffer<[f64; 4]>,
+    /// Row by row four planes: the points' fields.
+    points: Buffer<f32>,
     columns: Range<usize>,
     /// Rows in a ring.
-    pub rows: usize,
+    rows: usize,
+    /// Where the windows of a row's pixels lie.
+    rects: Vec<Rows>,
     /// The largest magnitude of a coordinate read so far.
     pub largest: f32,
     pub layer: Layer,
@@ -55,32 +72,46 @@ pub(crate) fn elements_of_rings(columns: usize, rows: usize) -> usize {
 /// Elements from a row of rings of so many columns to the next.
 #[inline(always)]
 fn stride(columns: usize) -> usize {
-    columns.next_multiple_of(GROUP) + 2
+    columns.next_multiple_of(LANES) + 2 * MARGIN
 }
 
 impl<const N: usize> Rings<N> {
     /// Bytes that a column takes in a row.
     pub const COLUMN: usize = size_of::<[f64; N]>() + size_of::<Counted>();
 
+    /// Whether there are eight channels, and four more or alone.
+    pub const HAS_EIGHT: bool = {
+        assert!(N.is_multiple_of(4) && N < 16);
+        N >= 8
+    };
+    pub const HAS_FOUR: bool = N % 8 == 4;
+
     /// Bytes held.
     pub fn size(&self) -> usize {
-        self.sums.size() + self.points.size()
+        self.eights.size() + self.fours.size() + self.points.size() + bytes(&self.rects)
     }
 
-    /// Makes room for so many elements.
-    pub fn reserve(&mut self, elements: usize) -> Result<(), Error> {
-        self.points.grow(elements + BLOCK * GROUP)?;
-        self.sums.grow(elements)
+    /// Makes room for so many elements, and windows of up to this radius.
+    pub fn reserve(&mut self, elements: usize, radius: usize) -> Result<(), Error> {
+        self.points.grow(size_of::<Counted>() / size_of::<f32>() * (elements + BLOCK * GROUP))?;
+        self.eights.grow(N / 8 * elements)?;
+        self.fours.grow(N % 8 / 4 * elements)?;
+        Rows::reserve(&mut self.rects, radius)
     }
 
     /// Starts over at row `top` of a layer's points, with rings of so many rows; there is room.
     pub fn start(&mut self, columns: Range<usize>, top: usize, rows: usize, layer: &Layer) {
         (self.columns, self.largest, self.rows) = (columns, 0.0, rows);
         (self.layer, self.nearest_hidden) = (*layer, f32::INFINITY);
-        let length = self.rows * self.stride();
-        self.points[..length].fill([0.0; 4]);
+        let length = 4 * self.rows * self.stride();
+        self.points[..length].fill(0.0);
         let above = self.row(top + self.rows - 1);
-        self.sums[above].fill([0.0; N]);
+        if Self::HAS_EIGHT {
+            self.eights[above.clone()].fill([0.0; 8]);
+        }
+        if Self::HAS_FOUR {
+            self.fours[above].fill([0.0; 4]);
+        }
     }
 
     /// Elements from a row to the next.
@@ -89,30 +120,92 @@ impl<const N: usize> Rings<N> {
         stride(self.columns.len())
     }
 
+    /// Where a column is in a row.
+    #[inline(always)]
+    pub fn place(&self, x: usize) -> usize {
+        x - self.columns.start + MARGIN
+    }
+
     /// The first column.
     #[inline(always)]
     pub fn left(&self) -> usize {
         self.columns.start
     }
 
+    /// Where row `y` starts in the ring of sums.
+    #[inline(always)]
+    pub fn start_of(&self, y: usize) -> usize {
+        y % self.rows * self.stride()
+    }
+
+    /// Where the row above row `y` starts.
+    #[inline(always)]
+    pub fn start_above(&self, y: usize) -> usize {
+        self.start_of(y + self.rows - 1)
+    }
+
     #[inline(always)]
     fn row(&self, y: usize) -> Range<usize> {
-        let start = y % self.rows * self.stride();
+        let start = self.start_of(y);
         start..start + self.stride()
     }
 
-    /// The points, and the sums.
+    /// Row `y`'s plane of a field of the points.
     #[inline(always)]
-    pub fn parts(&self) -> (&[Counted], &[[f64; N]]) {
-        let length = self.rows * self.stride();
-        (&self.points[..length], &self.sums[..length])
+    fn plane(&self, y: usize, field: usize) -> Range<usize> {
+        let Range { start, end } = self.row(y);
+        let plane = 4 * start + field * (end - start);
+        plane..plane + (end - start)
     }
 
-    /// The points of row `y` from column `x` on, room for `BLOCK` groups; those behind the last column mean nothing.
+    /// The first fields of a row's points; the others are a stride apart.
     #[inline(always)]
-    pub fn points_from(&self, x: usize, y: usize) -> &[Counted; BLOCK * GROUP] {
-        let first = self.row(y).start + x - self.columns.start + 1;
-        self.points[first..].first_chunk().expect("room behind the last row")
+    fn fields(&self, y: usize) -> *const f32 {
+        self.points[4 * self.start_of(y)..][..4 * self.stride()].as_ptr()
+    }
+
+    /// The sums of eight channels, and of four.
+    #[inline(always)]
+    pub fn sums(&self) -> (*const f64, *const f64) {
+        (self.eights.as_ptr().cast(), self.fours.as_ptr().cast())
+    }
+
+    /// The points' fields.
+    #[inline(always)]
+    pub fn points(&self) -> &[f32] {
+        &self.points[..self.rows * self.row_of_points()]
+    }
+
+    /// From the fields of a row's points to the next row's.
+    #[inline(always)]
+    pub fn row_of_points(&self) -> usize {
+        4 * self.stride()
+    }
+
+    /// The points of row `y` and those next to them.
+    #[inline(always)]
+    pub fn around(&self, y: usize) -> Around {
+        Around {
+            own: self.fields(y),
+            above: self.fields(y + self.rows - 1),
+            below: self.fields(y + 1),
+            plane: self.stride(),
+        }
+    }
+
+    /// Finds the rows of the windows around the pixels of row `y`, of radii up to `largest`, in an image of this height;
+    /// `edge` of them are not summed over at both ends.
+    pub fn aim(&mut self, y: usize, largest: usize, edge: usize, height: usize) {
+        let mut rects = std::mem::take(&mut self.rects);
+        rects.clear();
+        rects.extend((0..=largest).map(|radius| Rows::new(self, y, radius, edge, height)));
+        self.rects = rects;
+    }
+
+    /// The rows of the windows of a radius, of the row aimed at.
+    #[inline(always)]
+    pub fn rows_of(&self, radius: usize) -> &Rows {
+        &self.rects[radius]
     }
 
     /// Reads row `y` of the points, of which `depths` says which are missing. `whole_points` as
@@ -121,111 +214,275 @@ impl<const N: usize> Rings<N> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn read<S: Groups>(
+    pub unsafe fn read<S: Along>(
         &mut self,
         points: &Points,
         depths: &[f32],
         y: usize,
         whole_points: bool,
     ) {
-        let row = self.row(y);
-        let count = self.columns.len();
-        let length = count.next_multiple_of(GROUP);
+        let stride = self.stride();
+        let start = 4 * self.start_of(y);
+        let length = self.columns.len().next_multiple_of(LANES);
         assert!(self.columns.start + length <= depths.len());
         let points = points.row(y, self.columns.clone(), whole_points);
-        let to = &mut self.points[row][1..];
-        // SAFETY: as the caller's; the depths and the row have room for whole groups.
+        let to = self.points[start..][..4 * stride].as_mut_ptr();
+        // SAFETY: as the caller's; the depths and the row have room for whole pairs of groups.
         unsafe {
+            let to = to.add(MARGIN);
+            let none = S::splat(f32::NAN);
             let mut largest = S::splat(self.largest);
-            for x in (0..length).step_by(GROUP) {
+            for x in (0..length).step_by(S::LANES) {
                 let depths = S::load(depths.as_ptr().add(self.columns.start + x));
                 let deeper = S::lt(S::splat(self.layer.deepest), S::abs(depths));
                 let there = S::and_not(deeper, S::eq(depths, depths));
                 let point = points.lanes::<S>(x);
-                let mut fields = [[0.0; GROUP]; 4];
                 for c in 0..3 {
-                    let field = S::and(there, point[c]);
+                    let field = S::select(there, point[c], none);
                     largest = S::max(S::abs(field), largest);
-                    S::store(fields[c].as_mut_ptr(), field);
+                    S::store(to.add(c * stride + x), field);
                 }
-                S::store(fields[3].as_mut_ptr(), S::and(there, S::splat(1.0)));
-                let (from, to) = (fields.as_ptr().cast::<f32>(), to[x..x + GROUP].as_mut_ptr());
-                transpose4(from, GROUP, to.cast(), 4);
-                transpose4(from.add(4), GROUP, to.add(4).cast(), 4);
+                S::store(to.add(WEIGHT * stride + x), S::and(there, S::splat(1.0)));
             }
-            let mut lanes = [0.0; GROUP];
+            let mut lanes = [0.0; LANES];
             S::store(lanes.as_mut_ptr(), largest);
             self.largest = lanes.into_iter().fold(0.0, f32::max);
         }
-        to[count..].fill([0.0; 4]);
+        self.end_row(y);
         if self.layer.hides_some() {
-            self.hide(depths, y);
+            self.hide(y, |x| depths[x]);
         }
     }
 
-    /// Hides the points of row `y` that are not in the layer.
+    /// Has no points behind the last column.
+    fn end_row(&mut self, y: usize) {
+        let weights = self.plane(y, WEIGHT);
+        let end = MARGIN + self.columns.len();
+        self.points[weights][end..].fill(0.0);
+    }
+
+    /// Hides the points of row `y` whose depth, or what stands for it, by column, is not in the layer.
     #[cold]
-    fn hide(&mut self, depths: &[f32], y: usize) {
-        let row = self.row(y);
-        let depths = &depths[self.columns.clone()];
-        for (to, depth) in self.points[row][1..].iter_mut().zip(depths) {
-            if depth.abs() > self.layer.deepest {
-                *to = self.layer.hidden();
-                self.nearest_hidden = self.nearest_hidden.min(depth.abs());
+    fn hide(&mut self, y: usize, depth: impl Fn(usize) -> f32) {
+        let hidden = self.layer.hidden();
+        let planes: [_; 4] = std::array::from_fn(|field| self.plane(y, field).start);
+        for x in self.columns.clone() {
+            let depth = depth(x).abs();
+            if depth > self.layer.deepest {
+                for (plane, value) in planes.iter().zip(hidden) {
+                    self.points[plane + MARGIN + x - self.columns.start] = value;
+                }
+                self.nearest_hidden = self.nearest_hidden.min(depth);
             }
         }
     }
 
     /// Reads row `y`, of which `depths` are the image's, as points: column, row and inverse depth.
+    #[inline(always)]
     pub fn read_positions(&mut self, depths: &[f32], y: usize) {
-        let row = self.row(y);
-        let depths = &depths[self.columns.clone()];
-        let (to, rest) = self.points[row][1..].split_at_mut(depths.len());
-        for ((x, depth), to) in self.columns.clone().zip(depths).zip(to) {
+        let (start, stride) = (4 * self.start_of(y), self.stride());
+        let Range { start: left, end } = self.columns;
+        let (xs, rest) = self.points[start..][..4 * stride].split_at_mut(stride);
+        let (ys, rest) = rest.split_at_mut(stride);
+        let (inverses, weights) = rest.split_at_mut(stride);
+        let fields = [xs, ys, inverses, weights].map(|plane| &mut plane[MARGIN..][..end - left]);
+        let [xs, ys, inverses, weights] = fields;
+        let mut largest = 0.0;
+        for (at, depth) in depths[left..end].iter().enumerate() {
             let inverse = inverse_depth(*depth);
-            *to = if inverse.is_nan() {
-                [0.0; 4]
-            } else if inverse.abs() > self.layer.deepest {
-                self.nearest_hidden = self.nearest_hidden.min(inverse.abs());
-                self.layer.hidden()
-            } else {
-                [x as f32, y as f32, inverse, 1.0]
-            };
+            (xs[at], ys[at]) = ((left + at) as f32, y as f32);
+            (inverses[at], weights[at]) = (inverse, if inverse.is_nan() { 0.0 } else { 1.0 });
+            largest = if inverse.abs() > largest { inverse.abs() } else { largest };
         }
-        rest.fill([0.0; 4]);
+        self.end_row(y);
+        if largest > self.layer.deepest {
+            self.hide(y, |x| inverse_depth(depths[x]));
+        }
     }
 
     /// Has no points in row `y`: it is outside the image.
     pub fn read_none(&mut self, y: usize) {
-        let row = self.row(y);
-        self.points[row].fill([0.0; 4]);
+        let weights = self.plane(y, WEIGHT);
+        self.points[weights].fill(0.0);
     }
 
     /// Sums row `y`; the rows around it have been read.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub fn push(&mut self, channels: &impl Channels<N>, y: usize) {
-        let count = self.columns.len();
-        let (above, own, below) = (self.row(y + self.rows - 1), self.row(y), self.row(y + 1));
-        let row = &self.points[own.clone()];
-        let (left, center, right) = (&row[..count], &row[1..=count], &row[2..count + 2]);
-        let up = &self.points[above.clone()][1..=count];
-        let down = &self.points[below][1..=count];
-        let Ok([above, sums]) = self.sums.get_disjoint_mut([above, own]) else { return };
-        let (above, sums) = (&above[1..=count], &mut sums[..=count]);
-        sums[0] = [0.0; N];
-        let sums = &mut sums[1..];
-        let mut along = [0.0; N];
-        for x in 0..count {
-            let value = channels.of(&center[x], [&left[x], &right[x]], [&up[x], &down[x]]);
-            for c in 0..N {
-                along[c] += value[c];
-                sums[x][c] = above[x][c] + along[c];
+    pub unsafe fn push<S: Groups>(&mut self, channels: &impl Channels<N>, y: usize) {
+        let points = self.around(y);
+        let (above, own) = (self.start_above(y), self.start_of(y));
+        let length = self.columns.len().next_multiple_of(GROUP);
+        let elements = self.rows * self.stride();
+        let eights = self.eights[..usize::from(Self::HAS_EIGHT) * elements].as_mut_ptr();
+        let fours = self.fours[..usize::from(Self::HAS_FOUR) * elements].as_mut_ptr();
+        // SAFETY: as the caller's; groups, and the pixels next to them, lie inside the rows of the rings.
+        unsafe {
+            let mut carries = [S::splat_d(0.0); 2];
+            if Self::HAS_EIGHT {
+                eights.add(own + MARGIN - 1).write([0.0; 8]);
+            }
+            if Self::HAS_FOUR {
+                fours.add(own + MARGIN - 1).write([0.0; 4]);
+            }
+            for x in (MARGIN..MARGIN + length).step_by(GROUP) {
+                let values = channels.of::<S>(&points.at(x));
+                if Self::HAS_EIGHT {
+                    let mut eight = [S::splat_d(0.0); 8];
+                    for i in 0..8 {
+                        eight[i] = values[i].0;
+                    }
+                    let rows = [eights.add(above + x).cast(), eights.add(own + x).cast()];
+                    push_eight::<S>(eight, rows, &mut carries[0]);
+                }
+                if Self::HAS_FOUR {
+                    let mut four = [S::splat_d(0.0); 4];
+                    for i in 0..4 {
+                        four[i] = values[N - 4 + i].0;
+                    }
+                    let rows = [fours.add(above + x).cast(), fours.add(own + x).cast()];
+                    push_four::<S>(four, rows, &mut carries[1]);
+                }
             }
         }
     }
 
     /// The sum over all that was pushed so far, `y` being the last row.
     pub fn total(&self, y: usize) -> [f64; N] {
-        self.sums[self.row(y).start + self.columns.len()]
+        let last = self.start_of(y) + MARGIN + self.columns.len() - 1;
+        let mut total = [0.0; N];
+        let (eight, four) = total.split_at_mut(N / 8 * 8);
+        if Self::HAS_EIGHT {
+            eight.copy_from_slice(&self.eights[last]);
+        }
+        if Self::HAS_FOUR {
+            four.copy_from_slice(&self.fours[last]);
+        }
+        total
+    }
+}
+
+/// Adds eight pixels' channels, eight, to their row's sums and those of the row above; `carry` is the sum along the row.
+///
+/// # Safety
+/// The processor has the instruction set of `S`; the rows, above and own, have so many pixels.
+#[inline(always)]
+unsafe fn push_eight<S: Groups>(values: [S::D; 8], [above, own]: [*mut f64; 2], carry: &mut S::D) {
+    // SAFETY: as the caller's.
+    unsafe {
+        let pixels = S::transpose_d(values);
+        // What a pixel waits for is one addition a group: that to the carry.
+        let mut along = pixels[0];
+        for lane in 0..GROUP {
+            if lane > 0 {
+                along = S::add_d(along, pixels[lane]);
+            }
+            let sum = S::add_d(S::add_d(along, *carry), S::load_d(above.add(8 * lane)));
+            S::store_d(own.add(8 * lane), sum);
+        }
+        *carry = S::add_d(along, *carry);
+    }
+}
+
+/// As [`push_eight`], of four channels; `carry` is the sum along the row twice.
+///
+/// # Safety
+/// As [`push_eight`].
+#[inline(always)]
+unsafe fn push_four<S: Groups>(values: [S::D; 4], [above, own]: [*mut f64; 2], carry: &mut S::D) {
+    // SAFETY: as the caller's.
+    unsafe {
+        // Side by side the first four pixels and the last four, which go on from there.
+        let mut along = S::transpose_fours_d(values);
+        for i in 1..4 {
+            along[i] = S::add_d(along[i - 1], along[i]);
+        }
+        let [start, _] = S::join_halves_d(S::splat_d(0.0), along[3]);
+        let start = S::add_d(start, *carry);
+        for i in 0..4 {
+            let at = |half: usize| 4 * (i + 4 * half);
+            along[i] = S::add_d(along[i], start);
+            let sum = S::add_d(along[i], S::load_fours_d(|half| above.add(at(half))));
+            S::store_fours_d(sum, |half| own.add(at(half)));
+        }
+        [_, *carry] = S::join_halves_d(along[3], along[3]);
+    }
+}
+
+/// The fields of a row's points and of those next to them.
+#[derive(Clone, Copy)]
+pub(crate) struct Around {
+    own: *const f32,
+    above: *const f32,
+    below: *const f32,
+    /// From a field to the next.
+    plane: usize,
+}
+
+impl Around {
+    /// Those from a place of the row on.
+    #[inline(always)]
+    pub fn at(&self, place: usize) -> Around {
+        Around {
+            own: self.own.wrapping_add(place),
+            above: self.above.wrapping_add(place),
+            below: self.below.wrapping_add(place),
+            plane: self.plane,
+        }
+    }
+
+    /// A field of eight points, up to `BLOCK` columns apart.
+    ///
+    /// # Safety
+    /// As [`Around::own`].
+    #[inline(always)]
+    pub unsafe fn apart<S: Groups>(&self, field: usize, step: usize) -> Floats<S> {
+        debug_assert!(step <= BLOCK);
+        let first = self.own.wrapping_add(field * self.plane);
+        // SAFETY: as the caller's; behind the last row there is room for so many.
+        unsafe {
+            if step == 1 {
+                return Floats::load(first);
+            }
+            let mut eight = [0.0; GROUP];
+            for (lane, to) in eight.iter_mut().enumerate() {
+                *to = *first.wrapping_add(lane * step);
+            }
+            Floats::load(eight.as_ptr())
+        }
+    }
+
+    /// A field of eight points.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn own<S: Groups>(&self, field: usize) -> Floats<S> {
+        // SAFETY: as the caller's; the rows have so many.
+        unsafe { Floats::load(self.own.wrapping_add(field * self.plane)) }
+    }
+
+    /// A field of the points to the left and to the right.
+    ///
+    /// # Safety
+    /// As [`Around::own`].
+    #[inline(always)]
+    pub unsafe fn beside<S: Groups>(&self, field: usize) -> [Floats<S>; 2] {
+        let own = self.own.wrapping_add(field * self.plane);
+        // SAFETY: as the caller's; the rows have margins.
+        unsafe { [Floats::load(own.wrapping_sub(1)), Floats::load(own.wrapping_add(1))] }
+    }
+
+    /// A field of the points above and below.
+    ///
+    /// # Safety
+    /// As [`Around::own`].
+    #[inline(always)]
+    pub unsafe fn over<S: Groups>(&self, field: usize) -> [Floats<S>; 2] {
+        let rows = [self.above, self.below].map(|row| row.wrapping_add(field * self.plane));
+        // SAFETY: as the caller's; the rows have so many.
+        unsafe { [Floats::load(rows[0]), Floats::load(rows[1])] }
     }
 }

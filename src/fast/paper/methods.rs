@@ -1,22 +1,22 @@
 //! Step 4 of the paper, fast: what each method sums, and eight normals from eight windows' sums. The plain forms are
 //! in `paper::methods`.
 
-use super::integrals::{Channels, Counted};
+use super::integrals::{Around, Channels, Rings, WEIGHT};
 use super::rects::Rects;
 use crate::fast::arithmetic::{Doubles, Floats, cross, dot};
 use crate::fast::moments::{Matrices, WindowMoments, sum_of_moments};
 use crate::fast::run::{Noted, OfRun};
 use crate::fast::tile::{Bits, Found};
 use crate::paper::{CleanPoints, ROUNDING, Rect};
-use crate::simd::{GROUP, Groups, Simd, load_by_fours};
+use crate::simd::{GROUP, Groups, Simd};
 
 /// A method's sums and normals.
 pub(crate) trait Sums<const N: usize>: Channels<N> {
     /// What the normals of a run of pixels are made from.
     type OfRun: Noted;
 
-    /// Whether the window's outermost rows and columns are not summed over.
-    const INNER: bool;
+    /// How many of the window's rows and columns are not summed over, at each side.
+    const EDGE: usize;
 
     /// Whether the ends of the window's middle row and column are wanted.
     const ENDS: bool;
@@ -32,11 +32,11 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
     /// these `lanes` mean something.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`; the rectangles are of a ring that has these points.
+    /// The processor has the instruction set of `S`; the windows are of these rings.
     unsafe fn note<S: Groups>(
         sums: &[Doubles<S>; N],
         rects: &Rects,
-        points: &[Counted],
+        rings: &Rings<N>,
         lanes: u32,
         run: &mut Self::OfRun,
         at: usize,
@@ -76,33 +76,32 @@ impl CovarianceMatrix {
     }
 }
 
-/// x, y, z, the number of points; xx, yy, zz, it again; xy, yz, zx, it again: fours, as sums are read.
+/// x, y, z, the number of points, xx, yy, zz, xy; yz, zx, and twice the number again: eight and four, as sums are read.
 pub(crate) const MOMENTS: usize = 12;
 
 impl Channels<MOMENTS> for CovarianceMatrix {
     #[inline(always)]
-    fn of(&self, own: &Counted, _: [&Counted; 2], _: [&Counted; 2]) -> [f64; MOMENTS] {
-        // In fours, the point's count like a coordinate whose origin is 0.
-        let there = f64::from(own[3]);
-        let mut p = [0.0; 4];
-        for c in 0..4 {
-            p[c] = (f64::from(own[c]) - self.origin[c]) * there;
+    unsafe fn of<S: Groups>(&self, points: &Around) -> [Doubles<S>; MOMENTS] {
+        // SAFETY: as the caller's.
+        unsafe {
+            let weight = points.own::<S>(WEIGHT);
+            let there = S::lt(S::splat(0.0), weight.0);
+            let count = weight.widen();
+            let mut about = [count; 3];
+            for c in 0..3 {
+                let coordinate = Floats::<S>(S::and(there, points.own::<S>(c).0)).widen();
+                about[c] = (coordinate - Doubles::splat(self.origin[c])) * count;
+            }
+            let [x, y, z] = about;
+            [x, y, z, count, x * x, y * y, z * z, x * y, y * z, z * x, count, count]
         }
-        let next = [p[1], p[2], p[0], p[3]];
-        let mut moments = [0.0; MOMENTS];
-        for c in 0..4 {
-            moments[c] = p[c];
-            moments[4 + c] = p[c] * p[c];
-            moments[8 + c] = p[c] * next[c];
-        }
-        moments
     }
 }
 
 impl Sums<MOMENTS> for CovarianceMatrix {
     type OfRun = Matrices;
 
-    const INNER: bool = false;
+    const EDGE: usize = 0;
     const ENDS: bool = false;
 
     fn error(total: [f64; MOMENTS], _: usize, _: f32) -> f64 {
@@ -118,12 +117,12 @@ impl Sums<MOMENTS> for CovarianceMatrix {
     unsafe fn note<S: Groups>(
         sums: &[Doubles<S>; MOMENTS],
         _: &Rects,
-        _: &[Counted],
+        _: &Rings<MOMENTS>,
         _: u32,
         run: &mut Matrices,
         at: usize,
     ) {
-        let [x, y, z, count, xx, yy, zz, _, xy, yz, xz, _] = *sums;
+        let [x, y, z, count, xx, yy, zz, xy, yz, xz, ..] = *sums;
         let sums = [x, y, z, xx, xy, xz, yy, yz, zz];
         // SAFETY: as the caller's.
         unsafe {
@@ -153,16 +152,29 @@ impl Sums<MOMENTS> for CovarianceMatrix {
     }
 }
 
-/// The differences between a pixel's neighbours and whether both are there: x, y, z, count. Exact: what cancels in
-/// the sums leaves nothing.
+/// What points before and after pixels weigh together, and the differences between these fields of them: exact, so that
+/// what cancels in the sums leaves nothing.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
 #[inline(always)]
-fn difference([before, after]: [&Counted; 2]) -> [f64; 4] {
-    let both = f64::from(before[3] * after[3]);
-    let mut difference = [both; 4];
-    for c in 0..3 {
-        difference[c] = (f64::from(after[c]) - f64::from(before[c])) * both;
+unsafe fn differences<S: Groups, const N: usize>(
+    pairs: [[Floats<S>; 2]; N],
+    weights: [Floats<S>; 2],
+) -> ([Doubles<S>; N], Doubles<S>) {
+    // SAFETY: as the caller's.
+    unsafe {
+        let weight = weights[0] * weights[1];
+        let both = S::lt(S::splat(0.0), weight.0);
+        let weight = weight.widen();
+        let mut differences = [weight; N];
+        for (to, pair) in differences.iter_mut().zip(pairs) {
+            let [before, after] = pair;
+            let (before, after) = (S::and(both, before.0), S::and(both, after.0));
+            *to = (Floats(after).widen() - Floats(before).widen()) * weight;
+        }
+        (differences, weight)
     }
-    difference
 }
 
 /// What the error of sums of differences stays below.
@@ -170,40 +182,27 @@ fn error_of_differences(count: usize, largest: f32) -> f64 {
     2.0 * ROUNDING * f64::from(largest) * count as f64
 }
 
-/// The coordinates of eight points of `points`, and which of them are there.
-///
-/// # Safety
-/// The processor has the instruction set of `S`; all of `places` are inside.
-#[inline(always)]
-pub(crate) unsafe fn gather<S: Groups>(
-    points: &[Counted],
-    places: &[i32; GROUP],
-) -> [Floats<S>; 4] {
-    debug_assert!(places.iter().all(|at| (*at as usize) < points.len()));
-    let points = points.as_ptr();
-    // SAFETY: as the caller's; a point is four floats.
-    unsafe {
-        let place = |lane: usize| points.add(places[lane] as usize).cast();
-        let [x, y, z, count] = load_by_fours::<S>(place);
-        [Floats(x), Floats(y), Floats(z), Floats(count)]
-    }
-}
-
 /// The 3-D gradients.
 pub(crate) struct Gradients;
 
 impl Channels<8> for Gradients {
     #[inline(always)]
-    fn of(&self, _: &Counted, row: [&Counted; 2], column: [&Counted; 2]) -> [f64; 8] {
-        let ([a, b, c, d], [e, f, g, h]) = (difference(row), difference(column));
-        [a, b, c, d, e, f, g, h]
+    unsafe fn of<S: Groups>(&self, points: &Around) -> [Doubles<S>; 8] {
+        // SAFETY: as the caller's.
+        unsafe {
+            let row = [points.beside::<S>(0), points.beside(1), points.beside(2)];
+            let column = [points.over::<S>(0), points.over(1), points.over(2)];
+            let ([a, b, c], d) = differences(row, points.beside(WEIGHT));
+            let ([e, f, g], h) = differences(column, points.over(WEIGHT));
+            [a, b, c, d, e, f, g, h]
+        }
     }
 }
 
 impl Sums<8> for Gradients {
     type OfRun = Tangents;
 
-    const INNER: bool = true;
+    const EDGE: usize = 1;
     const ENDS: bool = false;
 
     fn error(_: [f64; 8], count: usize, largest: f32) -> f64 {
@@ -219,7 +218,7 @@ impl Sums<8> for Gradients {
     unsafe fn note<S: Groups>(
         sums: &[Doubles<S>; 8],
         _: &Rects,
-        _: &[Counted],
+        _: &Rings<8>,
         _: u32,
         run: &mut Tangents,
         at: usize,
@@ -243,18 +242,20 @@ pub(crate) struct SmoothedDepthChanges;
 
 impl Channels<4> for SmoothedDepthChanges {
     #[inline(always)]
-    fn of(&self, _: &Counted, [left, right]: [&Counted; 2], [up, down]: [&Counted; 2]) -> [f64; 4] {
-        let row = f64::from(left[3] * right[3]);
-        let column = f64::from(up[3] * down[3]);
-        let difference = |before: f32, after: f32| f64::from(after) - f64::from(before);
-        [difference(left[2], right[2]) * row, row, difference(up[2], down[2]) * column, column]
+    unsafe fn of<S: Groups>(&self, points: &Around) -> [Doubles<S>; 4] {
+        // SAFETY: as the caller's.
+        unsafe {
+            let ([h], row) = differences([points.beside::<S>(2)], points.beside(WEIGHT));
+            let ([v], column) = differences([points.over::<S>(2)], points.over(WEIGHT));
+            [h, row, v, column]
+        }
     }
 }
 
 impl Sums<4> for SmoothedDepthChanges {
     type OfRun = Tangents;
 
-    const INNER: bool = true;
+    const EDGE: usize = 1;
     const ENDS: bool = true;
 
     fn error(_: [f64; 4], count: usize, largest: f32) -> f64 {
@@ -270,7 +271,7 @@ impl Sums<4> for SmoothedDepthChanges {
     unsafe fn note<S: Groups>(
         sums: &[Doubles<S>; 4],
         rects: &Rects,
-        points: &[Counted],
+        rings: &Rings<4>,
         lanes: u32,
         run: &mut Tangents,
         at: usize,
@@ -278,8 +279,8 @@ impl Sums<4> for SmoothedDepthChanges {
         let [h, h_count, v, v_count] = *sums;
         // SAFETY: as the caller's.
         unsafe {
-            let [hx, hy, h_span] = outermost::<S>(rects, 0, points, lanes);
-            let [vx, vy, v_span] = outermost::<S>(rects, 1, points, lanes);
+            let [hx, hy, h_span] = outermost::<S, _>(rects, rings, 0, lanes);
+            let [vx, vy, v_span] = outermost::<S, _>(rects, rings, 1, lanes);
             // Times twice the number of depth changes, which are over two pixels each.
             let (h_count, v_count) = (h_count.narrow(), v_count.narrow());
             let (h_count, v_count) = (h_count + h_count, v_count + v_count);
@@ -300,21 +301,18 @@ impl Sums<4> for SmoothedDepthChanges {
 /// how far apart these are.
 ///
 /// # Safety
-/// As [`Sums::normals`].
+/// As [`Sums::note`].
 #[inline(always)]
-unsafe fn outermost<S: Groups>(
+unsafe fn outermost<S: Groups, const N: usize>(
     rects: &Rects,
+    rings: &Rings<N>,
     line: usize,
-    points: &[Counted],
     lanes: u32,
 ) -> [Floats<S>; 3] {
     // SAFETY: as the caller's.
     unsafe {
-        let [first, last] = &rects.ends[line];
-        let (a, b) = (gather::<S>(points, first), gather::<S>(points, last));
-        let span = Floats::load(rects.spans[line].as_ptr());
-        let found = [b[0] - a[0], b[1] - a[1], span];
-        let missing = (a[3] * b[3]).lt(Floats::splat(1.0)) & lanes;
+        let found = rects.ends::<S, N>(rings, line);
+        let missing = lanes & !S::bits(S::eq(found[0].0, found[0].0));
         if missing == 0 {
             return found;
         }
@@ -323,7 +321,7 @@ unsafe fn outermost<S: Groups>(
             S::store(fields[c].as_mut_ptr(), found[c].0);
         }
         for lane in Bits(missing) {
-            let one = rects.outermost(line, lane, points);
+            let one = rects.outermost(rings, line, lane);
             let [dx, dy, span] =
                 one.map_or([0.0; 3], |([a, b], span)| [b[0] - a[0], b[1] - a[1], span]);
             (fields[0][lane], fields[1][lane], fields[2][lane]) = (dx, dy, span);

@@ -48,9 +48,10 @@ const TILE_ROWS: usize = 256;
 /// hundreds of megabytes.)
 const ROOMY_RADIUS: usize = 64;
 
-/// Bytes of a tile's rings. Eight windows' corners move along them from group to group, which needs no more than a few
-/// of the rows' cache lines at a time: narrow tiles cost more, in pixels around them that are summed twice.
-const RING_BYTES: usize = 4 << 20;
+/// Bytes of a tile's rings, found by trying: with less, more of the pixels around narrow tiles are summed twice; with more,
+/// rings leave a second-level cache of 2 MiB, and CM takes a tenth more time there. (Where that cache is smaller but the
+/// third level is fast, twice as much is a few percent better.)
+const RING_BYTES: usize = 3 << 19;
 
 /// Rows of the whole image: depths, and the radii of windows.
 #[derive(Debug, Default)]
@@ -202,7 +203,7 @@ pub(crate) fn even_windows(
     let grid = Grid::new(cloud.width, cloud.height, largest, Rings::<MOMENTS>::COLUMN);
     let room = grid.room(asked.limit);
     for scratch in &each[..workers.count()] {
-        lock(scratch).paper.moments.reserve(room)?;
+        lock(scratch).paper.moments.reserve(room, grid.most(asked.limit))?;
     }
     workers.for_each(grid.count(), |worker, item| {
         let Some((columns, rows)) = grid.tile(item) else { return };
@@ -297,13 +298,17 @@ impl Grid {
     /// Elements of the rings that there is to be room for: those of the tiles, and of tiles for smaller windows, or larger
     /// ones up to `limit`.
     fn room(&self, limit: u32) -> usize {
-        let &Grid { width, height, reach, column, .. } = self;
-        let most = reach.max(ROOMY_RADIUS.min(limit as usize));
+        let &Grid { width, height, column, .. } = self;
         let elements = |reach: usize| {
             let columns = Grid::new(width, height, reach, column).columns + 2 * reach;
             elements_of_rings(columns.min(width), rows_of_rings(reach, height))
         };
-        (0..=most).map(elements).max().expect("a radius")
+        (0..=self.most(limit)).map(elements).max().expect("a radius")
+    }
+
+    /// The largest radius of windows that there is to be room for.
+    fn most(&self, limit: u32) -> usize {
+        self.reach.max(ROOMY_RADIUS.min(limit as usize))
     }
 
     /// The columns and rows of a tile, which start with a block; none where the tiles before have covered all.
@@ -431,15 +436,18 @@ impl<'a> Job<'a> {
             (&depths[y * length..][..length], &radii[at..at + radii_length])
         };
         let grid = Grid::new(width, height, largest, column(options.method));
-        let room = grid.room(options.paper.largest_radius);
+        let limit = options.paper.largest_radius;
+        let (room, most) = (grid.room(limit), grid.most(limit));
         for scratch in &each[..workers.count()] {
             let WorkerScratch { moments, gradients, depth_changes, waiting, .. } =
                 &mut lock(scratch).paper;
             waiting.reserve(width.div_ceil(step), grid.rows.div_ceil(step))?;
             match options.method {
-                Method::CovarianceMatrix => moments.reserve(room)?,
-                Method::AverageDepthChange => depth_changes.reserve(room)?,
-                Method::Average3DGradient | Method::Simple3DGradient => gradients.reserve(room)?,
+                Method::CovarianceMatrix => moments.reserve(room, most)?,
+                Method::AverageDepthChange => depth_changes.reserve(room, most)?,
+                Method::Average3DGradient | Method::Simple3DGradient => {
+                    gradients.reserve(room, most)?
+                }
             }
         }
         workers.for_each(grid.count(), |worker, item| {

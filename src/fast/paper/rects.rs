@@ -1,214 +1,334 @@
-//! Where in a tile's rings eight windows lie (Eq. 3).
+//! Where in a tile's rings windows lie (Eq. 3).
 
-use super::integrals::Counted;
-use crate::fast::arithmetic::Doubles;
+use super::integrals::{Counted, MARGIN, Rings, WEIGHT};
+use crate::Error;
+use crate::fast::arithmetic::{Doubles, Floats};
+use crate::memory::make_room;
 use crate::simd::{GROUP, Groups};
+
+/// The rows of the windows of a radius around a row's pixels, inside the image.
+#[derive(Clone, Debug)]
+pub(crate) struct Rows {
+    first: usize,
+    last: usize,
+    /// Where in the ring of sums the row above the first of them starts, and where the last does; or of those inside them.
+    above: usize,
+    below: usize,
+    /// Where in the ring of points the first, the middle and the last of them start.
+    ends: [usize; 3],
+}
+
+impl Rows {
+    /// Makes room for windows of up to a radius.
+    pub fn reserve(rows: &mut Vec<Rows>, radius: usize) -> Result<(), Error> {
+        make_room(rows, radius + 1)
+    }
+
+    /// Those of a radius around row `y` of an image of this height; `edge` of them are not summed over at both ends.
+    pub fn new<const N: usize>(
+        rings: &Rings<N>,
+        y: usize,
+        radius: usize,
+        edge: usize,
+        height: usize,
+    ) -> Self {
+        let (first, last) = (y.saturating_sub(radius), (y + radius).min(height - 1));
+        Rows {
+            first,
+            last,
+            above: rings.start_above(first + edge),
+            below: rings.start_above(last + 1 - edge),
+            ends: [first, (first + last) / 2, last].map(|y| 4 * rings.start_of(y)),
+        }
+    }
+}
 
 type Indices = [i32; GROUP];
 
-/// The rings that the indices are for, and the pixels.
+/// Eight pixels of a row, some columns apart.
 #[derive(Clone, Copy)]
-pub(crate) struct Place {
-    /// Width and height of the image.
-    pub image: [usize; 2],
-    /// The first pixel of the eight, and how many columns they are apart.
+pub(crate) struct Pixels {
+    /// The first one's column.
     pub x: usize,
-    pub y: usize,
+    /// From one to the next.
     pub step: usize,
-    /// The rings' first column, their elements from a row to the next, and their rows.
-    pub left: usize,
-    pub stride: usize,
-    pub rows: usize,
+    /// Columns of the image.
+    pub width: usize,
 }
 
-/// Indices of the elements that eight windows need.
-#[derive(Default)]
-pub(crate) struct Rects {
-    /// Of the sums up to the windows' upper left, upper right, lower left and lower right corners: of their first
-    /// channels.
-    pub corners: [Indices; 4],
-    /// Of the points at both ends of the middle row, and of the middle column.
-    pub ends: [[Indices; 2]; 2],
-    /// How many pixels these are apart.
-    pub spans: [[f32; GROUP]; 2],
-    /// The rings' elements from a row to the next, and their rows.
-    stride: usize,
-    rows: usize,
+/// The columns of eight pixels' windows: places in the rows of the rings.
+pub(crate) enum Rects {
+    /// All of a radius, and inside the image, of pixels side by side, the first of which is at this place.
+    Alike { radius: usize, place: usize },
+    /// The first and the last columns of each.
+    Each { radii: Indices, first: Indices, last: Indices },
 }
 
 /// Pixel numbers in a group.
 pub(crate) const STEPS: [f32; GROUP] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 impl Rects {
-    /// Where eight windows lie, as `paper::smoothing_area::window` has them, in rings of sums of `N` channels.
+    /// The windows of these radii, as `paper::smoothing_area::window` has them, of the row that the rings are aimed at; those
+    /// of other `lanes` mean nothing, but have such radii too.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`. Elements' indices are below 2^24.
+    /// The processor has the instruction set of `S`. Columns of the image are below 2^24.
     #[inline(always)]
     pub unsafe fn new<S: Groups, const N: usize>(
-        place: &Place,
-        radii: S::F,
-        inner: bool,
-        ends: bool,
+        rings: &Rings<N>,
+        pixels: &Pixels,
+        radii: Floats<S>,
+        lanes: u32,
     ) -> Self {
-        const { assert!(N.is_multiple_of(4)) };
-        let mut rects = Rects { stride: place.stride, rows: place.rows, ..Rects::default() };
-        // SAFETY: as the caller's; floats hold indices exactly.
+        let &Pixels { x, step, width } = pixels;
+        let mut each = [0; GROUP];
+        // SAFETY: as the caller's; floats hold columns exactly.
         unsafe {
-            let (zero, one) = (S::splat(0.0), S::splat(1.0));
-            let steps = S::mul(S::load(STEPS.as_ptr()), S::splat(place.step as f32));
-            let at = S::add(steps, S::splat((place.x - place.left) as f32));
-            // Pixels behind the last column stand for that.
-            let at = S::min(at, S::splat((place.image[0] - 1 - place.left) as f32));
-            let x = range::<S>(at, radii, -(place.left as f32), place.image[0] as f32);
-            let y = range::<S>(zero, radii, -(place.y as f32), place.image[1] as f32);
-            let edge = if inner { one } else { zero };
-            let (left, right) = (S::add(x[0], edge), S::sub(x[1], edge));
-            let above = row_start::<S>(place, S::sub(S::add(y[0], edge), one));
-            let last = row_start::<S>(place, S::sub(S::sub(y[1], edge), one));
-            let corners = [(above, left), (above, right), (last, left), (last, right)];
-            for (to, (row, column)) in rects.corners.iter_mut().zip(corners) {
-                // Times N: not every instruction set has a product of integers.
-                let element = S::truncate_i(S::add(row, column));
-                let twice = S::add_i(element, element);
-                let four = S::add_i(twice, twice);
-                let mut channel = four;
-                for _ in 1..N / 4 {
-                    channel = S::add_i(channel, four);
-                }
-                S::store_i(to.as_mut_ptr(), channel);
+            let splat = |value: usize| Floats::<S>::splat(value as f32);
+            S::store_i(each.as_mut_ptr(), S::truncate_i(radii.0));
+            let radius = each[lanes.trailing_zeros() as usize % GROUP] as usize;
+            let differ = !S::bits(S::eq(radii.0, splat(radius).0));
+            if step == 1 && lanes & differ == 0 && x >= radius && x + GROUP + radius <= width {
+                return Rects::Alike { radius, place: rings.place(x) };
             }
-            if ends {
-                // The element of a column's point is the next one.
-                let column = S::add(middle::<S>(place, x), one);
-                let row = row_start::<S>(place, middle::<S>(place, y));
-                let last = row_start::<S>(place, S::sub(y[1], one));
-                store::<S>(&mut rects.ends[0][0], S::add(row, S::add(x[0], one)));
-                store::<S>(&mut rects.ends[0][1], S::add(row, x[1]));
-                store::<S>(&mut rects.ends[1][0], S::add(row_start::<S>(place, y[0]), column));
-                store::<S>(&mut rects.ends[1][1], S::add(last, column));
-                S::store(rects.spans[0].as_mut_ptr(), S::sub(S::sub(x[1], x[0]), one));
-                S::store(rects.spans[1].as_mut_ptr(), S::sub(S::sub(y[1], y[0]), one));
-            }
+            let [start, end] = range(pixels.columns(), radii, width);
+            let shift = Floats::splat(MARGIN as f32) - splat(rings.left());
+            let places = |columns: Floats<S>| {
+                let mut places = [0; GROUP];
+                S::store_i(places.as_mut_ptr(), S::truncate_i((columns + shift).0));
+                places
+            };
+            Rects::Each { radii: each, first: places(start), last: places(end - splat(1)) }
         }
-        rects
     }
 
-    /// The sums over the eight windows (Eq. 3, not divided), channel by channel.
+    /// The sums over the windows (Eq. 3, not divided), channel by channel; over those without their outermost columns if
+    /// `edge` is 1.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`; the corners lie in `sums`.
+    /// The processor has the instruction set of `S`; the windows are of these rings.
     #[inline(always)]
-    pub unsafe fn sums<S: Groups, const N: usize>(&self, sums: &[[f64; N]]) -> [Doubles<S>; N] {
-        const { assert!(N.is_multiple_of(4)) };
-        debug_assert!(self.corners.iter().flatten().all(|at| (*at as usize) < N * sums.len()));
-        let sums = sums.as_ptr().cast::<f64>();
-        // SAFETY: as the caller's; an element has fours of channels.
-        unsafe {
-            let mut channels = [Doubles::splat(0.0); N];
-            let [a, b, c, d] = &self.corners;
-            let eights = N / GROUP * GROUP;
-            for first in (0..eights).step_by(GROUP) {
-                let mut windows = [S::splat_d(0.0); GROUP];
-                for lane in 0..GROUP {
-                    let at = |corner: &Indices| S::load_d(sums.add(corner[lane] as usize + first));
-                    windows[lane] = S::sub_d(S::sub_d(at(d), at(c)), S::sub_d(at(b), at(a)));
-                }
-                let eight = S::transpose_d(windows);
-                for i in 0..GROUP {
-                    channels[first + i] = Doubles(eight[i]);
-                }
+    pub unsafe fn sums<S: Groups, const N: usize>(
+        &self,
+        rings: &Rings<N>,
+        edge: usize,
+    ) -> [Doubles<S>; N] {
+        match self {
+            &Rects::Alike { radius, place } => {
+                let &Rows { above, below, .. } = rings.rows_of(radius);
+                let columns = [place + edge - radius - 1, place + radius - edge];
+                let corners = [above, below].map(|row| columns.map(|column| row + column));
+                let of_lane = |lane: usize| corners.map(|row| row.map(|corner| corner + lane));
+                // SAFETY: as the caller's.
+                unsafe { sums_between(rings, of_lane) }
             }
-            for first in (eights..N).step_by(4) {
-                let at = |corner: &Indices, lane: usize| {
-                    let four = |i: usize| sums.add(corner[lane + 4 * i] as usize + first);
-                    Doubles::<S>(S::load_fours_d(four))
+            Rects::Each { radii, first, last } => {
+                let of_lane = |lane: usize| {
+                    let &Rows { above, below, .. } = rings.rows_of(radii[lane] as usize);
+                    let columns = [first[lane] as usize + edge - 1, last[lane] as usize - edge];
+                    [above, below].map(|row| columns.map(|column| row + column))
                 };
-                let mut windows = [S::splat_d(0.0); 4];
-                for i in 0..4 {
-                    windows[i] = ((at(d, i) - at(c, i)) - (at(b, i) - at(a, i))).0;
-                }
-                let fours = S::transpose_fours_d(windows);
-                for i in 0..4 {
-                    channels[first + i] = Doubles(fours[i]);
+                // SAFETY: as the caller's.
+                unsafe { sums_between(rings, of_lane) }
+            }
+        }
+    }
+
+    /// The differences in x and y between the points at both ends of eight windows' middle rows (`line` 0) or columns, NaN
+    /// where one is missing, and how far apart these are.
+    ///
+    /// # Safety
+    /// As [`Rects::sums`].
+    #[inline(always)]
+    pub unsafe fn ends<S: Groups, const N: usize>(
+        &self,
+        rings: &Rings<N>,
+        line: usize,
+    ) -> [Floats<S>; 3] {
+        let (points, plane) = (rings.points().as_ptr(), rings.stride());
+        match self {
+            &Rects::Alike { radius, place } => {
+                let rows = rings.rows_of(radius);
+                let [top, middle, bottom] = rows.ends;
+                let [from, to, span] = if line == 0 {
+                    [middle + place - radius, middle + place + radius, 2 * radius]
+                } else {
+                    [top + place, bottom + place, rows.last - rows.first]
+                };
+                let at = |end: usize, field: usize| points.wrapping_add(end + field * plane);
+                // SAFETY: as the caller's.
+                unsafe {
+                    let dx = Floats::<S>::load(at(to, 0)) - Floats::load(at(from, 0));
+                    let dy = Floats::<S>::load(at(to, 1)) - Floats::load(at(from, 1));
+                    [dx, dy, Floats::splat(span as f32)]
                 }
             }
-            channels
+            Rects::Each { radii, first, last } => {
+                let mut fields = [[0.0; GROUP]; 3];
+                for lane in 0..GROUP {
+                    let (first, last) = (first[lane] as usize, last[lane] as usize);
+                    let rows = rings.rows_of(radii[lane] as usize);
+                    let [top, middle, bottom] = rows.ends;
+                    let column = (first + last) / 2;
+                    let [from, to, span] = if line == 0 {
+                        [middle + first, middle + last, last - first]
+                    } else {
+                        [top + column, bottom + column, rows.last - rows.first]
+                    };
+                    for field in 0..2 {
+                        // SAFETY: as the caller's.
+                        let at = |end: usize| unsafe { *points.wrapping_add(end + field * plane) };
+                        fields[field][lane] = at(to) - at(from);
+                    }
+                    fields[2][lane] = span as f32;
+                }
+                // SAFETY: as the caller's; there are so many.
+                unsafe {
+                    let load = |field: usize| Floats::load(fields[field].as_ptr());
+                    [load(0), load(1), load(2)]
+                }
+            }
         }
     }
 
     /// Of a window's middle row (`line` 0) or column the outermost points that are there, and how far apart these are; none
     /// if there are not two.
-    pub fn outermost(
+    pub fn outermost<const N: usize>(
         &self,
+        rings: &Rings<N>,
         line: usize,
         lane: usize,
-        points: &[Counted],
     ) -> Option<([Counted; 2], f32)> {
-        let (step, count) = ([1, self.stride][line], self.spans[line][lane] as usize + 1);
-        let length = self.stride * self.rows;
-        let ends = self.ends[line];
-        let (mut a, mut b) = (ends[0][lane] as usize, ends[1][lane] as usize);
-        let (mut first, mut last) = (0, count - 1);
-        while points[a][3] == 0.0 && first < last {
-            (a, first) = (a + step, first + 1);
+        let (radius, left, right) = match self {
+            Rects::Alike { radius, place } => {
+                (*radius, place + lane - radius, place + lane + radius)
+            }
+            Rects::Each { radii, first, last } => {
+                (radii[lane] as usize, first[lane] as usize, last[lane] as usize)
+            }
+        };
+        let Rows { first, last, ends: [top, middle, bottom], .. } = rings.rows_of(radius);
+        let (mut a, mut b, step, mut span) = if line == 0 {
+            (middle + left, middle + right, 1, right - left)
+        } else {
+            let column = (left + right) / 2;
+            (top + column, bottom + column, rings.row_of_points(), last - first)
+        };
+        let (points, length) = (rings.points(), rings.points().len());
+        let is_missing = |at: usize| points[at + WEIGHT * rings.stride()] == 0.0;
+        while is_missing(a) && span > 0 {
+            (a, span) = (a + step, span - 1);
             a -= if a >= length { length } else { 0 };
         }
-        while points[b][3] == 0.0 && first < last {
-            (b, last) = (if b < step { b + length } else { b } - step, last - 1);
+        while is_missing(b) && span > 0 {
+            (b, span) = (if b < step { b + length } else { b } - step, span - 1);
         }
-        (first < last).then(|| ([points[a], points[b]], (last - first) as f32))
+        let point = |at: usize| std::array::from_fn(|field| points[at + field * rings.stride()]);
+        (span > 0).then(|| ([point(a), point(b)], span as f32))
     }
 }
 
-/// The columns or rows around `at`, between `first` and `size` after that.
+/// A window's corners: above and below, left and right.
+type Corners = [[usize; 2]; 2];
+
+/// The sums between the corners of eight windows.
+///
+/// # Safety
+/// The processor has the instruction set of `S`; the rings have such elements.
+#[inline(always)]
+unsafe fn sums_between<S: Groups, const N: usize>(
+    rings: &Rings<N>,
+    corners: impl Fn(usize) -> Corners,
+) -> [Doubles<S>; N] {
+    let (eights, fours) = rings.sums();
+    // SAFETY: as the caller's.
+    unsafe {
+        let mut channels = [Doubles::splat(0.0); N];
+        if Rings::<N>::HAS_EIGHT {
+            let mut windows = [S::splat_d(0.0); GROUP];
+            for lane in 0..GROUP {
+                let [above, below] = corners(lane);
+                let above = along_eight::<S>(eights, above);
+                windows[lane] = S::sub_d(along_eight::<S>(eights, below), above);
+            }
+            let eight = S::transpose_d(windows);
+            for i in 0..8 {
+                channels[i] = Doubles(eight[i]);
+            }
+        }
+        if Rings::<N>::HAS_FOUR {
+            let mut windows = [S::splat_d(0.0); 4];
+            for lane in 0..4 {
+                let ([above, below], [next_above, next_below]) = (corners(lane), corners(4 + lane));
+                let above = along_four::<S>(fours, [above, next_above]);
+                windows[lane] = S::sub_d(along_four::<S>(fours, [below, next_below]), above);
+            }
+            let four = S::transpose_fours_d(windows);
+            for i in 0..4 {
+                channels[N - 4 + i] = Doubles(four[i]);
+            }
+        }
+        channels
+    }
+}
+
+/// The eight channels between two elements of a row.
+///
+/// # Safety
+/// As [`sums_between`].
+#[inline(always)]
+unsafe fn along_eight<S: Groups>(eights: *const f64, [left, right]: [usize; 2]) -> S::D {
+    // SAFETY: as the caller's.
+    unsafe {
+        let left = S::load_d(eights.wrapping_add(8 * left));
+        S::sub_d(S::load_d(eights.wrapping_add(8 * right)), left)
+    }
+}
+
+/// The four channels between two elements of a row, and between two of another.
+///
+/// # Safety
+/// As [`sums_between`].
+#[inline(always)]
+unsafe fn along_four<S: Groups>(fours: *const f64, [first, second]: [[usize; 2]; 2]) -> S::D {
+    // SAFETY: as the caller's.
+    unsafe {
+        let place = |half: usize, end: usize| fours.wrapping_add(4 * [first, second][half][end]);
+        let left = S::load_fours_d(|half| place(half, 0));
+        S::sub_d(S::load_fours_d(|half| place(half, 1)), left)
+    }
+}
+
+impl Pixels {
+    /// Their columns; the last one of the image stands for those behind it.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`. Columns of the image are below 2^24.
+    #[inline(always)]
+    pub unsafe fn columns<S: Groups>(&self) -> Floats<S> {
+        // SAFETY: as the caller's; floats hold columns exactly.
+        unsafe {
+            let steps = Floats::<S>::load(STEPS.as_ptr()) * Floats::splat(self.step as f32);
+            let columns = steps + Floats::splat(self.x as f32);
+            Floats(S::min(columns.0, S::splat((self.width - 1) as f32)))
+        }
+    }
+}
+
+/// The columns or rows around `at`, of so many: the first, and that after the last.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-pub(crate) unsafe fn range<S: Groups>(at: S::F, radii: S::F, first: f32, size: f32) -> [S::F; 2] {
+pub(crate) unsafe fn range<S: Groups>(
+    at: Floats<S>,
+    radii: Floats<S>,
+    count: usize,
+) -> [Floats<S>; 2] {
     // SAFETY: as the caller's.
     unsafe {
-        let end = S::add(S::add(at, radii), S::splat(1.0));
-        [S::max(S::sub(at, radii), S::splat(first)), S::min(end, S::splat(first + size))]
+        let end = at + radii + Floats::splat(1.0);
+        let start = (at - radii).max(Floats::splat(0.0));
+        [start, Floats(S::min(end.0, S::splat(count as f32)))]
     }
-}
-
-/// Where rows, counted from the pixels' own, start in the rings.
-///
-/// # Safety
-/// The processor has the instruction set of `S`.
-#[inline(always)]
-unsafe fn row_start<S: Groups>(place: &Place, row: S::F) -> S::F {
-    // SAFETY: as the caller's.
-    unsafe {
-        let rows = S::splat(place.rows as f32);
-        let at = S::add(S::splat((place.y % place.rows) as f32), row);
-        let at = S::add(at, S::and(S::lt(at, S::splat(0.0)), rows));
-        let at = S::sub(at, S::and_not(S::lt(at, rows), rows));
-        S::mul(at, S::splat(place.stride as f32))
-    }
-}
-
-/// `Rect::middle`
-///
-/// # Safety
-/// The processor has the instruction set of `S`.
-#[inline(always)]
-unsafe fn middle<S: Groups>(place: &Place, [start, end]: [S::F; 2]) -> S::F {
-    // SAFETY: as the caller's.
-    unsafe {
-        // Rounded down, also below zero.
-        let shift = S::splat(place.rows as f32);
-        let twice = S::sub(S::add(start, end), S::splat(1.0));
-        S::sub(S::truncate(S::add(S::mul(twice, S::splat(0.5)), shift)), shift)
-    }
-}
-
-/// # Safety
-/// The processor has the instruction set of `S`.
-#[inline(always)]
-unsafe fn store<S: Groups>(to: &mut Indices, value: S::F) {
-    // SAFETY: as the caller's.
-    unsafe { S::store_i(to.as_mut_ptr(), S::truncate_i(value)) };
 }

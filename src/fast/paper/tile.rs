@@ -3,10 +3,10 @@
 
 use std::ops::Range;
 
-use super::integrals::{Counted, Rings, reached, rows_of_rings};
+use super::integrals::{Rings, WEIGHT, reached, rows_of_rings};
 use super::layers::{Layer, Waiting, with_fraction};
-use super::methods::{Sums, gather};
-use super::rects::{Place, Rects};
+use super::methods::Sums;
+use super::rects::{Pixels, Rects};
 use crate::cloud::Points;
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::fast::lanes::LANES;
@@ -65,25 +65,36 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         }
         let mut run = Run::default();
         // SAFETY: as the caller's.
-        unsafe { rings.read::<S>(self.points, (self.row)(top).0, top, self.whole_points) };
+        unsafe { self.read::<S, N>(rings, top) };
         let mut next = top;
         for y in self.rows.clone().step_by(self.step) {
             while next < (middle(y, self.step, height) + reach + 1).min(bottom) {
                 if next + 1 < height {
-                    let depths = (self.row)(next + 1).0;
                     // SAFETY: as the caller's.
-                    unsafe { rings.read::<S>(self.points, depths, next + 1, self.whole_points) };
+                    unsafe { self.read::<S, N>(rings, next + 1) };
                 } else {
                     rings.read_none(next + 1);
                 }
-                rings.push(method, next);
+                // SAFETY: as the caller's.
+                unsafe { rings.push::<S>(method, next) };
                 next += 1;
             }
+            rings.aim(middle(y, self.step, height), reach, M::EDGE, height);
             let error = M::error(rings.total(next - 1), count, rings.largest);
             // SAFETY: as the caller's.
             unsafe { self.row::<S, M, N, PARTIAL>(rings, waiting, sink, &mut run, y, error) };
         }
         (layer.hides_some() && waiting.is_any()).then_some(rings.nearest_hidden)
+    }
+
+    /// Reads row `y` of the points.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn read<S: Groups, const N: usize>(&self, rings: &mut Rings<N>, y: usize) {
+        // SAFETY: as the caller's.
+        unsafe { rings.read::<S::Widest>(self.points, (self.row)(y).0, y, self.whole_points) };
     }
 
     /// A point of a layer: sums about it lose less.
@@ -109,17 +120,11 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         y: usize,
         error: f64,
     ) {
-        let image = [self.points.width(), self.points.height()];
-        let (left, stride, rows) = (rings.left(), rings.stride(), rings.rows);
-        let (points, sums) = rings.parts();
+        let (width, height) = (self.points.width(), self.points.height());
         let layer = rings.layer;
         let radii = (self.row)(y).1;
         let step = self.step;
-        let middle_row = middle(y, step, image[1]);
-        let mut steps = [0; GROUP];
-        for (lane, to) in steps.iter_mut().enumerate() {
-            *to = (lane * step) as i32;
-        }
+        let points = rings.around(middle(y, step, height));
         for start in self.columns.clone().step_by(RUN * step) {
             run.start = start;
             run.lanes = [0; RUN / LANES];
@@ -132,8 +137,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
             for (group, x) in (start..end).step_by(GROUP * step).enumerate() {
                 let at = group * GROUP;
                 let count = (end - x).div_ceil(step).min(GROUP);
-                let (x, y) = (x + step / 2, middle_row);
-                let place = Place { image, x, y, step, left, stride, rows };
+                let pixels = Pixels { x: x + step / 2, step, width };
                 // SAFETY: as the caller's; the rings hold what the windows of the tile's pixels need.
                 unsafe {
                     let eight = S::load(radii[x / step..].as_ptr());
@@ -147,18 +151,18 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                     run.lanes[pair] |= windows << shift;
                     // Behind the last column radii mean nothing.
                     let eight = S::and(S::mask(windows), eight);
-                    let rects = Rects::new::<S, N>(&place, eight, M::INNER, M::ENDS);
-                    let sums = rects.sums::<S, N>(sums);
+                    let rects = Rects::new::<S, N>(rings, &pixels, Floats(eight), windows);
+                    let sums = rects.sums::<S, N>(rings, M::EDGE);
+                    let own = points.at(rings.place(pixels.x));
                     if PARTIAL && layer.hides_some() {
-                        let [.., weights] = gather::<S>(rings.points_from(x, y), &steps);
-                        let lanes = with_hidden::<S, M, N>(&sums, &rects, points, windows)
-                            | weights.lt(Floats::splat(1.0));
+                        let lanes = with_hidden::<S, M, N>(&sums, &rects, rings, windows)
+                            | own.apart::<S>(WEIGHT, step).lt(Floats::splat(1.0));
                         hidden[pair] |= (windows & lanes) << shift;
                         run.lanes[pair] &= !(lanes << shift);
                     }
-                    M::note::<S>(&sums, &rects, points, windows, &mut run.sums, at);
-                    let [px, py, pz, _] = gather::<S>(rings.points_from(x, y), &steps);
-                    run.points.store::<S>(at, [px, py, pz]);
+                    M::note::<S>(&sums, &rects, rings, windows, &mut run.sums, at);
+                    let own = [own.apart(0, step), own.apart(1, step), own.apart(2, step)];
+                    run.points.store::<S>(at, own);
                 }
             }
             if PARTIAL {
@@ -243,7 +247,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
 unsafe fn with_hidden<S: Groups, M: Sums<N>, const N: usize>(
     sums: &[Doubles<S>; N],
     rects: &Rects,
-    points: &[Counted],
+    rings: &Rings<N>,
     lanes: u32,
 ) -> u32 {
     let [a, b] = M::weights(sums);
@@ -252,8 +256,8 @@ unsafe fn with_hidden<S: Groups, M: Sums<N>, const N: usize>(
     // A missing point beside one at the end of a middle row or column leaves no difference with it.
     if M::ENDS {
         let is_hidden = |lane: &usize| {
-            let ends = [0, 1].map(|line| rects.outermost(line, *lane, points));
-            ends.iter().flatten().any(|(ends, _)| ends.iter().any(|end| end[3] < 1.0))
+            let ends = [0, 1].map(|line| rects.outermost(rings, line, *lane));
+            ends.iter().flatten().any(|(ends, _)| ends.iter().any(|end| end[WEIGHT] < 1.0))
         };
         hidden |= Bits(lanes & !hidden).filter(is_hidden).fold(0, |all, lane| all | 1 << lane);
     }
