@@ -41,8 +41,8 @@ const BOUNDS: [(Semantics, Method, BorderPolicy, u64, u64); 10] = [
     (Pcl, AverageDepthChange, Mirror, 199, 282),
     (Pcl, Simple3DGradient, Ignore, 104, 184),
     (Paper, CovarianceMatrix, Ignore, 245, 486),
-    (Paper, Average3DGradient, Ignore, 212, 335),
-    (Paper, AverageDepthChange, Ignore, 221, 367),
+    (Paper, Average3DGradient, Ignore, 178, 335),
+    (Paper, AverageDepthChange, Ignore, 204, 334),
 ];
 
 /// In metres: how far the cloud is moved, and the depth of the far plane.

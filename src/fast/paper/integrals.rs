@@ -80,11 +80,11 @@ impl<const N: usize> Rings<N> {
     pub const COLUMN: usize = size_of::<[f64; N]>() + size_of::<Counted>();
 
     /// Whether there are eight channels, and four more or alone.
-    pub const HAS_EIGHT: bool = {
+    pub(super) const HAS_EIGHT: bool = {
         assert!(N.is_multiple_of(4) && N < 16);
         N >= 8
     };
-    pub const HAS_FOUR: bool = N % 8 == 4;
+    pub(super) const HAS_FOUR: bool = N % 8 == 4;
 
     /// Bytes held.
     pub fn size(&self) -> usize {
