@@ -299,7 +299,9 @@ impl<'a> Points<'a> {
         assert!(y < self.grid.height && columns.end <= self.grid.width);
         let offset = self.grid.offset(columns.start, y);
         let step = self.grid.point_stride;
-        let inside = columns.end.min(self.grid.width - 1).saturating_sub(columns.start);
+        // Behind all points but the very last one is another.
+        let end = if y + 1 < self.grid.height { self.grid.width } else { self.grid.width - 1 };
+        let inside = columns.end.min(end).saturating_sub(columns.start);
         let whole = if whole_points { inside } else { 0 };
         let below = if y + 2 < self.grid.height { 2 * self.grid.row_stride } else { 0 };
         let first = self.x.wrapping_byte_add(offset);
@@ -329,7 +331,7 @@ impl PointRow<'_> {
     #[inline(always)]
     pub unsafe fn lanes<S: Along>(&self, at: usize) -> [S::F; 3] {
         prefetch(self.first.wrapping_byte_add(self.below + at * self.step), S::LANES * self.step);
-        // SAFETY: as the caller's; the points are inside the row, and of those that are read whole none is its last.
+        // SAFETY: as the caller's; the points are inside the row, and of those that are read whole none is the last.
         unsafe {
             if at + S::LANES <= self.whole {
                 return S::load_points(self.first.byte_add(at * self.step), self.step);

@@ -24,6 +24,8 @@ unsafe impl Number for f32 {}
 unsafe impl Number for f64 {}
 // SAFETY: as all numbers.
 unsafe impl Number for i32 {}
+// SAFETY: as all numbers.
+unsafe impl Number for u32 {}
 // SAFETY: arrays have no padding.
 unsafe impl<T: Number, const N: usize> Number for [T; N] {}
 

@@ -31,6 +31,8 @@ pub(crate) unsafe fn read<S: Along>(
         let none = S::splat(f32::NAN);
         let (mut nearest, mut deepest) = (S::splat(f32::INFINITY), S::splat(0.0));
         for x in (0..width).step_by(S::LANES) {
+            // The last ones of a row again, if others would lie behind them.
+            let x = x.min(width.saturating_sub(S::LANES));
             let [px, py, pz] = points.lanes::<S>(x);
             let there = there::<S>([px, py, pz], options);
             let depth = depth::<S>([px, py, pz], range);

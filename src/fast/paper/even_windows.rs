@@ -132,7 +132,7 @@ impl EvenTile<'_> {
                 unsafe { rings.push::<S>(&moments, next) };
                 next += 1;
             }
-            rings.aim(row, reach, 0, height);
+            rings.aim(row, height);
             let total = rings.total(next - 1);
             for x in self.columns.clone().step_by(GROUP * BLOCK) {
                 let block = self.asked.blocks.block(y * width + x);
@@ -279,8 +279,8 @@ impl EvenTile<'_> {
         let pixels = Pixels { x, step: BLOCK, width: self.cloud.width };
         // SAFETY: as the caller's.
         unsafe {
-            let rects = Rects::new::<S, MOMENTS>(rings, &pixels, radii, lanes);
-            let [sx, sy, sr, n, xx, yy, rr, xy, yr, xr, ..] = rects.sums::<S, MOMENTS>(rings, 0);
+            let rects = Rects::new(rings, &pixels, radii, lanes, None);
+            let [sx, sy, sr, n, xx, yy, rr, xy, yr, xr, ..] = rects.sums(rings, 0);
             let share = Doubles::splat(1.0) / n;
             let (mx, my, mr) = (sx * share, sy * share, sr * share);
             let (xx, xy, yy) = (xx - sx * mx, xy - sx * my, yy - sy * my);

@@ -3,13 +3,12 @@
 use std::ops::Range;
 
 use super::layers::Layer;
-use super::rects::Rows;
+use super::presence::{Presence, Size};
 use crate::Error;
 use crate::cloud::Points;
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::fast::buffer::Buffer;
 use crate::fast::lanes::LANES;
-use crate::memory::bytes;
 use crate::paper::{BLOCK, inverse_depth};
 use crate::simd::{Along, GROUP, Groups};
 
@@ -42,15 +41,28 @@ pub(crate) struct Rings<const N: usize> {
     /// Row by row four planes: the points' fields.
     points: Buffer<f32>,
     columns: Range<usize>,
+    /// Elements from a row to the next.
+    stride: usize,
     /// Rows in a ring.
     rows: usize,
-    /// Where the windows of a row's pixels lie.
-    rects: Vec<Rows>,
+    aimed: Aimed,
+    /// Which points there are, of the rows that were noted.
+    pub presence: Presence,
     /// The largest magnitude of a coordinate read so far.
     pub largest: f32,
     pub layer: Layer,
     /// The least magnitude of depth of the points hidden so far.
     pub nearest_hidden: f32,
+}
+
+/// The row whose pixels' windows are asked for.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Aimed {
+    pub y: usize,
+    /// Rows of the image.
+    pub height: usize,
+    /// The last row down to this one that is the first in the rings.
+    first: usize,
 }
 
 /// The columns or rows, of so many, that windows of those in `range` reach at a distance from their pixels at most.
@@ -62,6 +74,11 @@ pub(crate) fn reached(range: &Range<usize>, reach: usize, count: usize) -> Range
 /// those above and below.
 pub(crate) fn rows_of_rings(reach: usize, height: usize) -> usize {
     (2 * reach + 3).min(height + 2)
+}
+
+/// Words that tell which points are there in rings of so many columns and rows.
+pub(crate) fn presence_of_rings(columns: usize, rows: usize) -> usize {
+    Size::new(stride(columns), rows).room()
 }
 
 /// Elements of rings of so many columns and rows.
@@ -88,22 +105,22 @@ impl<const N: usize> Rings<N> {
 
     /// Bytes held.
     pub fn size(&self) -> usize {
-        self.eights.size() + self.fours.size() + self.points.size() + bytes(&self.rects)
+        let sums = self.eights.size() + self.fours.size();
+        sums + self.points.size() + self.presence.size()
     }
 
-    /// Makes room for so many elements, and windows of up to this radius.
-    pub fn reserve(&mut self, elements: usize, radius: usize) -> Result<(), Error> {
+    /// Makes room for so many elements.
+    pub fn reserve(&mut self, elements: usize) -> Result<(), Error> {
         self.points.grow(size_of::<Counted>() / size_of::<f32>() * (elements + BLOCK * GROUP))?;
         self.eights.grow(N / 8 * elements)?;
-        self.fours.grow(N % 8 / 4 * elements)?;
-        Rows::reserve(&mut self.rects, radius)
+        self.fours.grow(N % 8 / 4 * elements)
     }
 
     /// Starts over at row `top` of a layer's points, with rings of so many rows; there is room.
     pub fn start(&mut self, columns: Range<usize>, top: usize, rows: usize, layer: &Layer) {
-        (self.columns, self.largest, self.rows) = (columns, 0.0, rows);
-        (self.layer, self.nearest_hidden) = (*layer, f32::INFINITY);
-        let length = 4 * self.rows * self.stride();
+        (self.stride, self.columns, self.rows) = (stride(columns.len()), columns, rows);
+        (self.layer, self.nearest_hidden, self.largest) = (*layer, f32::INFINITY, 0.0);
+        let length = 4 * self.rows * self.stride;
         self.points[..length].fill(0.0);
         let above = self.row(top + self.rows - 1);
         if Self::HAS_EIGHT {
@@ -114,10 +131,9 @@ impl<const N: usize> Rings<N> {
         }
     }
 
-    /// Elements from a row to the next.
-    #[inline(always)]
-    pub fn stride(&self) -> usize {
-        stride(self.columns.len())
+    /// Starts to note which points are there; there is room.
+    pub fn start_presence(&mut self) {
+        self.presence.start(Size::new(self.stride, self.rows));
     }
 
     /// Where a column is in a row.
@@ -135,7 +151,7 @@ impl<const N: usize> Rings<N> {
     /// Where row `y` starts in the ring of sums.
     #[inline(always)]
     pub fn start_of(&self, y: usize) -> usize {
-        y % self.rows * self.stride()
+        y % self.rows * self.stride
     }
 
     /// Where the row above row `y` starts.
@@ -147,7 +163,7 @@ impl<const N: usize> Rings<N> {
     #[inline(always)]
     fn row(&self, y: usize) -> Range<usize> {
         let start = self.start_of(y);
-        start..start + self.stride()
+        start..start + self.stride
     }
 
     /// Row `y`'s plane of a field of the points.
@@ -161,7 +177,7 @@ impl<const N: usize> Rings<N> {
     /// The first fields of a row's points; the others are a stride apart.
     #[inline(always)]
     fn fields(&self, y: usize) -> *const f32 {
-        self.points[4 * self.start_of(y)..][..4 * self.stride()].as_ptr()
+        self.points[4 * self.start_of(y)..][..4 * self.stride].as_ptr()
     }
 
     /// The sums of eight channels, and of four.
@@ -170,16 +186,23 @@ impl<const N: usize> Rings<N> {
         (self.eights.as_ptr().cast(), self.fours.as_ptr().cast())
     }
 
-    /// The points' fields.
+    /// The points' fields: row by row four planes.
     #[inline(always)]
-    pub fn points(&self) -> &[f32] {
-        &self.points[..self.rows * self.row_of_points()]
+    pub fn points(&self) -> *const f32 {
+        self.points.as_ptr()
     }
 
-    /// From the fields of a row's points to the next row's.
+    /// From a field of a row's points to the next.
     #[inline(always)]
-    pub fn row_of_points(&self) -> usize {
-        4 * self.stride()
+    pub fn plane_of_points(&self) -> usize {
+        self.stride
+    }
+
+    /// The fields of the point at a place in row `y`.
+    #[inline(always)]
+    pub fn point(&self, place: usize, y: usize) -> Counted {
+        let first = 4 * self.start_near(y) + place;
+        std::array::from_fn(|field| self.points[first + field * self.stride])
     }
 
     /// The points of row `y` and those next to them.
@@ -189,23 +212,50 @@ impl<const N: usize> Rings<N> {
             own: self.fields(y),
             above: self.fields(y + self.rows - 1),
             below: self.fields(y + 1),
-            plane: self.stride(),
+            plane: self.stride,
         }
     }
 
-    /// Finds the rows of the windows around the pixels of row `y`, of radii up to `largest`, in an image of this height;
-    /// `edge` of them are not summed over at both ends.
-    pub fn aim(&mut self, y: usize, largest: usize, edge: usize, height: usize) {
-        let mut rects = std::mem::take(&mut self.rects);
-        rects.clear();
-        rects.extend((0..=largest).map(|radius| Rows::new(self, y, radius, edge, height)));
-        self.rects = rects;
+    /// Aims at the windows around the pixels of row `y` in an image of this height.
+    pub fn aim(&mut self, y: usize, height: usize) {
+        self.aimed = Aimed { y, height, first: y - y % self.rows };
     }
 
-    /// The rows of the windows of a radius, of the row aimed at.
     #[inline(always)]
-    pub fn rows_of(&self, radius: usize) -> &Rows {
-        &self.rects[radius]
+    pub fn aimed(&self) -> Aimed {
+        self.aimed
+    }
+
+    /// [`Rings::start_of`] without a division, for rows that windows around the row aimed at reach; the one above the first
+    /// wraps around.
+    #[inline(always)]
+    pub fn start_near(&self, y: usize) -> usize {
+        let row = y.wrapping_sub(self.aimed.first) as isize;
+        let rows = self.rows as isize;
+        let turn = if row < 0 {
+            rows
+        } else if row < rows {
+            0
+        } else {
+            -rows
+        };
+        (row + turn) as usize * self.stride
+    }
+
+    /// [`Rings::start_near`] by lanes.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn starts_near<S: Groups>(&self, y: Floats<S>) -> Floats<S> {
+        // SAFETY: as the caller's; floats hold places in rings exactly.
+        unsafe {
+            let (rows, zero) = (Floats::<S>::splat(self.rows as f32), Floats::<S>::splat(0.0));
+            let row = y - Floats::splat(self.aimed.first as f32);
+            let row = row + Floats(S::and(S::lt(row.0, zero.0), rows.0));
+            let row = row - Floats(S::and_not(S::lt(row.0, rows.0), rows.0));
+            row * Floats::splat(self.stride as f32)
+        }
     }
 
     /// Reads row `y` of the points, of which `depths` says which are missing. `whole_points` as
@@ -221,10 +271,10 @@ impl<const N: usize> Rings<N> {
         y: usize,
         whole_points: bool,
     ) {
-        let stride = self.stride();
+        let stride = self.stride;
         let start = 4 * self.start_of(y);
-        let length = self.columns.len().next_multiple_of(LANES);
-        assert!(self.columns.start + length <= depths.len());
+        let count = self.columns.len();
+        assert!(self.columns.start + count.next_multiple_of(LANES) <= depths.len());
         let points = points.row(y, self.columns.clone(), whole_points);
         let to = self.points[start..][..4 * stride].as_mut_ptr();
         // SAFETY: as the caller's; the depths and the row have room for whole pairs of groups.
@@ -232,7 +282,9 @@ impl<const N: usize> Rings<N> {
             let to = to.add(MARGIN);
             let none = S::splat(f32::NAN);
             let mut largest = S::splat(self.largest);
-            for x in (0..length).step_by(S::LANES) {
+            for x in (0..count).step_by(S::LANES) {
+                // The last ones of a row again, if others would lie behind them.
+                let x = x.min(count.saturating_sub(S::LANES));
                 let depths = S::load(depths.as_ptr().add(self.columns.start + x));
                 let deeper = S::lt(S::splat(self.layer.deepest), S::abs(depths));
                 let there = S::and_not(deeper, S::eq(depths, depths));
@@ -280,7 +332,7 @@ impl<const N: usize> Rings<N> {
     /// Reads row `y`, of which `depths` are the image's, as points: column, row and inverse depth.
     #[inline(always)]
     pub fn read_positions(&mut self, depths: &[f32], y: usize) {
-        let (start, stride) = (4 * self.start_of(y), self.stride());
+        let (start, stride) = (4 * self.start_of(y), self.stride);
         let Range { start: left, end } = self.columns;
         let (xs, rest) = self.points[start..][..4 * stride].split_at_mut(stride);
         let (ys, rest) = rest.split_at_mut(stride);
@@ -300,6 +352,17 @@ impl<const N: usize> Rings<N> {
         }
     }
 
+    /// Notes which points of row `y` are there.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn note_presence<S: Along>(&mut self, y: usize) {
+        let weights = &self.points[self.plane(y, WEIGHT)];
+        // SAFETY: as the caller's.
+        unsafe { self.presence.push::<S>(weights, y) };
+    }
+
     /// Has no points in row `y`: it is outside the image.
     pub fn read_none(&mut self, y: usize) {
         let weights = self.plane(y, WEIGHT);
@@ -315,7 +378,7 @@ impl<const N: usize> Rings<N> {
         let points = self.around(y);
         let (above, own) = (self.start_above(y), self.start_of(y));
         let length = self.columns.len().next_multiple_of(GROUP);
-        let elements = self.rows * self.stride();
+        let elements = self.rows * self.stride;
         let eights = self.eights[..usize::from(Self::HAS_EIGHT) * elements].as_mut_ptr();
         let fours = self.fours[..usize::from(Self::HAS_FOUR) * elements].as_mut_ptr();
         // SAFETY: as the caller's; groups, and the pixels next to them, lie inside the rows of the rings.

@@ -35,7 +35,7 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
     /// The processor has the instruction set of `S`; the windows are of these rings.
     unsafe fn note<S: Groups>(
         sums: &[Doubles<S>; N],
-        rects: &Rects,
+        rects: &Rects<S>,
         rings: &Rings<N>,
         lanes: u32,
         run: &mut Self::OfRun,
@@ -116,7 +116,7 @@ impl Sums<MOMENTS> for CovarianceMatrix {
     #[inline(always)]
     unsafe fn note<S: Groups>(
         sums: &[Doubles<S>; MOMENTS],
-        _: &Rects,
+        _: &Rects<S>,
         _: &Rings<MOMENTS>,
         _: u32,
         run: &mut Matrices,
@@ -217,7 +217,7 @@ impl Sums<8> for Gradients {
     #[inline(always)]
     unsafe fn note<S: Groups>(
         sums: &[Doubles<S>; 8],
-        _: &Rects,
+        _: &Rects<S>,
         _: &Rings<8>,
         _: u32,
         run: &mut Tangents,
@@ -270,7 +270,7 @@ impl Sums<4> for SmoothedDepthChanges {
     #[inline(always)]
     unsafe fn note<S: Groups>(
         sums: &[Doubles<S>; 4],
-        rects: &Rects,
+        rects: &Rects<S>,
         rings: &Rings<4>,
         lanes: u32,
         run: &mut Tangents,
@@ -304,14 +304,14 @@ impl Sums<4> for SmoothedDepthChanges {
 /// As [`Sums::note`].
 #[inline(always)]
 unsafe fn outermost<S: Groups, const N: usize>(
-    rects: &Rects,
+    rects: &Rects<S>,
     rings: &Rings<N>,
     line: usize,
     lanes: u32,
 ) -> [Floats<S>; 3] {
     // SAFETY: as the caller's.
     unsafe {
-        let found = rects.ends::<S, N>(rings, line);
+        let found = rects.ends(rings, line);
         let missing = lanes & !S::bits(S::eq(found[0].0, found[0].0));
         if missing == 0 {
             return found;
@@ -320,8 +320,9 @@ unsafe fn outermost<S: Groups, const N: usize>(
         for c in 0..3 {
             S::store(fields[c].as_mut_ptr(), found[c].0);
         }
+        let each = rects.each();
         for lane in Bits(missing) {
-            let one = rects.outermost(rings, line, lane);
+            let one = each.outermost(rings, line, lane);
             let [dx, dy, span] =
                 one.map_or([0.0; 3], |([a, b], span)| [b[0] - a[0], b[1] - a[1], span]);
             (fields[0][lane], fields[1][lane], fields[2][lane]) = (dx, dy, span);

@@ -9,6 +9,7 @@ mod found;
 mod integrals;
 mod layers;
 mod methods;
+mod presence;
 mod rects;
 mod tile;
 mod windows;
@@ -19,7 +20,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use depths::row_length;
 use even_windows::EvenTile;
 use found::FoundRow;
-use integrals::{Rings, elements_of_rings, reached, rows_of_rings};
+use integrals::{Rings, elements_of_rings, presence_of_rings, reached, rows_of_rings};
 use layers::{Layer, Waiting};
 use methods::{CovarianceMatrix, Gradients, MOMENTS, SmoothedDepthChanges};
 use tile::Tile;
@@ -201,9 +202,9 @@ pub(crate) fn even_windows(
     let needed_blocks = (0..blocks.count()).filter(|block| needed[*block]);
     let largest = needed_blocks.map(radius).max().unwrap_or(0) as usize;
     let grid = Grid::new(cloud.width, cloud.height, largest, Rings::<MOMENTS>::COLUMN);
-    let room = grid.room(asked.limit);
+    let room = grid.room(asked.limit, elements_of_rings);
     for scratch in &each[..workers.count()] {
-        lock(scratch).paper.moments.reserve(room, grid.most(asked.limit))?;
+        lock(scratch).paper.moments.reserve(room)?;
     }
     workers.for_each(grid.count(), |worker, item| {
         let Some((columns, rows)) = grid.tile(item) else { return };
@@ -295,20 +296,16 @@ impl Grid {
         self.across * self.down
     }
 
-    /// Elements of the rings that there is to be room for: those of the tiles, and of tiles for smaller windows, or larger
-    /// ones up to `limit`.
-    fn room(&self, limit: u32) -> usize {
+    /// The room that there is to be for rings, of which `size` tells it by columns and rows: those of the tiles, and of tiles
+    /// for smaller windows, or larger ones up to `limit`.
+    fn room(&self, limit: u32, size: impl Fn(usize, usize) -> usize) -> usize {
         let &Grid { width, height, column, .. } = self;
-        let elements = |reach: usize| {
+        let of_reach = |reach: usize| {
             let columns = Grid::new(width, height, reach, column).columns + 2 * reach;
-            elements_of_rings(columns.min(width), rows_of_rings(reach, height))
+            size(columns.min(width), rows_of_rings(reach, height))
         };
-        (0..=self.most(limit)).map(elements).max().expect("a radius")
-    }
-
-    /// The largest radius of windows that there is to be room for.
-    fn most(&self, limit: u32) -> usize {
-        self.reach.max(ROOMY_RADIUS.min(limit as usize))
+        let most = self.reach.max(ROOMY_RADIUS.min(limit as usize));
+        (0..=most).map(of_reach).max().expect("a radius")
     }
 
     /// The columns and rows of a tile, which start with a block; none where the tiles before have covered all.
@@ -437,17 +434,18 @@ impl<'a> Job<'a> {
         };
         let grid = Grid::new(width, height, largest, column(options.method));
         let limit = options.paper.largest_radius;
-        let (room, most) = (grid.room(limit), grid.most(limit));
+        let room = grid.room(limit, elements_of_rings);
         for scratch in &each[..workers.count()] {
             let WorkerScratch { moments, gradients, depth_changes, waiting, .. } =
                 &mut lock(scratch).paper;
             waiting.reserve(width.div_ceil(step), grid.rows.div_ceil(step))?;
             match options.method {
-                Method::CovarianceMatrix => moments.reserve(room, most)?,
-                Method::AverageDepthChange => depth_changes.reserve(room, most)?,
-                Method::Average3DGradient | Method::Simple3DGradient => {
-                    gradients.reserve(room, most)?
+                Method::CovarianceMatrix => moments.reserve(room)?,
+                Method::AverageDepthChange => {
+                    depth_changes.reserve(room)?;
+                    depth_changes.presence.reserve(grid.room(limit, presence_of_rings))?;
                 }
+                Method::Average3DGradient | Method::Simple3DGradient => gradients.reserve(room)?,
             }
         }
         workers.for_each(grid.count(), |worker, item| {

@@ -1,17 +1,21 @@
 //! Where in a tile's rings windows lie (Eq. 3).
 
-use super::integrals::{Counted, MARGIN, Rings, WEIGHT};
-use crate::Error;
+use std::hint::black_box;
+
+use super::integrals::{Aimed, Counted, MARGIN, Rings};
 use crate::fast::arithmetic::{Doubles, Floats};
-use crate::memory::make_room;
 use crate::simd::{GROUP, Groups};
 
 /// The rows of the windows of a radius around a row's pixels, inside the image.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Rows {
+    radius: usize,
+    /// How many of them are not summed over at both ends.
+    edge: usize,
     first: usize,
-    last: usize,
-    /// Where in the ring of sums the row above the first of them starts, and where the last does; or of those inside them.
+    /// From the first to the last.
+    span: usize,
+    /// Where in the ring of sums the row above those that are summed over starts, and where the last of them does.
     above: usize,
     below: usize,
     /// Where in the ring of points the first, the middle and the last of them start.
@@ -19,26 +23,31 @@ pub(crate) struct Rows {
 }
 
 impl Rows {
-    /// Makes room for windows of up to a radius.
-    pub fn reserve(rows: &mut Vec<Rows>, radius: usize) -> Result<(), Error> {
-        make_room(rows, radius + 1)
-    }
-
-    /// Those of a radius around row `y` of an image of this height; `edge` of them are not summed over at both ends.
-    pub fn new<const N: usize>(
-        rings: &Rings<N>,
-        y: usize,
-        radius: usize,
-        edge: usize,
-        height: usize,
-    ) -> Self {
+    /// Those of a radius around the row aimed at.
+    #[inline(always)]
+    pub fn new<const N: usize>(rings: &Rings<N>, radius: usize, edge: usize) -> Self {
+        let Aimed { y, height, .. } = rings.aimed();
         let (first, last) = (y.saturating_sub(radius), (y + radius).min(height - 1));
         Rows {
+            radius,
+            edge,
             first,
-            last,
-            above: rings.start_above(first + edge),
-            below: rings.start_above(last + 1 - edge),
-            ends: [first, (first + last) / 2, last].map(|y| 4 * rings.start_of(y)),
+            span: last - first,
+            above: rings.start_near((first + edge).wrapping_sub(1)),
+            below: rings.start_near(last.wrapping_sub(edge)),
+            ends: [first, (first + last) / 2, last].map(|y| 4 * rings.start_near(y)),
+        }
+    }
+
+    /// Where in the ring of points the middle row (`line` 0) or column of a window starts and ends, whose pixel is at this
+    /// place, and how far apart that is.
+    #[inline(always)]
+    fn line(&self, place: usize, line: usize) -> ([usize; 2], usize) {
+        let &Rows { radius, span, ends: [first, middle, last], .. } = self;
+        if line == 0 {
+            ([middle + place - radius, middle + place + radius], 2 * radius)
+        } else {
+            ([first + place, last + place], span)
         }
     }
 }
@@ -56,80 +65,95 @@ pub(crate) struct Pixels {
     pub width: usize,
 }
 
-/// The columns of eight pixels' windows: places in the rows of the rings.
-pub(crate) enum Rects {
-    /// All of a radius, and inside the image, of pixels side by side, the first of which is at this place.
-    Alike { radius: usize, place: usize },
-    /// The first and the last columns of each.
-    Each { radii: Indices, first: Indices, last: Indices },
+/// Eight pixels' windows: columns are places in the rows of the rings, rows are the image's.
+pub(crate) enum Rects<S: Groups> {
+    /// All of a radius, and inside the image's columns, of pixels side by side, the first of which is at this place.
+    Alike { rows: Rows, place: usize },
+    /// The first and the last columns and rows of each.
+    Each { columns: [Floats<S>; 2], rows: [Floats<S>; 2] },
 }
 
 /// Pixel numbers in a group.
 pub(crate) const STEPS: [f32; GROUP] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
-impl Rects {
+impl<S: Groups> Rects<S> {
     /// The windows of these radii, as `paper::smoothing_area::window` has them, of the row that the rings are aimed at; those
-    /// of other `lanes` mean nothing, but have such radii too.
+    /// of other `lanes` mean nothing, but have such radii too. `rows` are those of the last windows that were alike; without,
+    /// none are taken for alike.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`. Columns of the image are below 2^24.
     #[inline(always)]
-    pub unsafe fn new<S: Groups, const N: usize>(
+    pub unsafe fn new<const N: usize>(
         rings: &Rings<N>,
         pixels: &Pixels,
         radii: Floats<S>,
         lanes: u32,
+        rows: Option<&mut Rows>,
     ) -> Self {
         let &Pixels { x, step, width } = pixels;
-        let mut each = [0; GROUP];
         // SAFETY: as the caller's; floats hold columns exactly.
         unsafe {
             let splat = |value: usize| Floats::<S>::splat(value as f32);
-            S::store_i(each.as_mut_ptr(), S::truncate_i(radii.0));
-            let radius = each[lanes.trailing_zeros() as usize % GROUP] as usize;
-            let differ = !S::bits(S::eq(radii.0, splat(radius).0));
-            if step == 1 && lanes & differ == 0 && x >= radius && x + GROUP + radius <= width {
-                return Rects::Alike { radius, place: rings.place(x) };
+            if let Some(rows) = rows {
+                let mut each = [0.0; GROUP];
+                S::store(each.as_mut_ptr(), radii.0);
+                let first = each[lanes.trailing_zeros() as usize % GROUP];
+                let radius = first as usize;
+                let differ = !S::bits(S::eq(radii.0, S::splat(first)));
+                if lanes & differ == 0 && x >= radius && x + GROUP + radius <= width {
+                    if rows.radius != radius {
+                        *rows = Rows::new(rings, radius, rows.edge);
+                    }
+                    return Rects::Alike { rows: *rows, place: rings.place(x) };
+                }
             }
-            let [start, end] = range(pixels.columns(), radii, width);
+            let Aimed { y, height, .. } = rings.aimed();
+            let (columns, rows) = (pixels.columns(), splat(y));
+            let [left, right] = range(columns, radii, width);
+            let [top, bottom] = range(rows, radii, height);
             let shift = Floats::splat(MARGIN as f32) - splat(rings.left());
-            let places = |columns: Floats<S>| {
-                let mut places = [0; GROUP];
-                S::store_i(places.as_mut_ptr(), S::truncate_i((columns + shift).0));
-                places
-            };
-            Rects::Each { radii: each, first: places(start), last: places(end - splat(1)) }
+            let one = splat(1);
+            Rects::Each { columns: [left + shift, right + shift - one], rows: [top, bottom - one] }
         }
     }
 
-    /// The sums over the windows (Eq. 3, not divided), channel by channel; over those without their outermost columns if
-    /// `edge` is 1.
+    /// The sums over the windows (Eq. 3, not divided), channel by channel; over those without their outermost columns and
+    /// rows if `edge` is 1.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`; the windows are of these rings.
     #[inline(always)]
-    pub unsafe fn sums<S: Groups, const N: usize>(
-        &self,
-        rings: &Rings<N>,
-        edge: usize,
-    ) -> [Doubles<S>; N] {
+    pub unsafe fn sums<const N: usize>(&self, rings: &Rings<N>, edge: usize) -> [Doubles<S>; N] {
         match self {
-            &Rects::Alike { radius, place } => {
-                let &Rows { above, below, .. } = rings.rows_of(radius);
+            &Rects::Alike { rows: Rows { radius, above, below, .. }, place } => {
                 let columns = [place + edge - radius - 1, place + radius - edge];
                 let corners = [above, below].map(|row| columns.map(|column| row + column));
-                let of_lane = |lane: usize| corners.map(|row| row.map(|corner| corner + lane));
+                let of_lane =
+                    |lane: usize| corners.map(|row| row.map(|corner| 8 * (corner + lane)));
                 // SAFETY: as the caller's.
                 unsafe { sums_between(rings, of_lane) }
             }
-            Rects::Each { radii, first, last } => {
-                let of_lane = |lane: usize| {
-                    let &Rows { above, below, .. } = rings.rows_of(radii[lane] as usize);
-                    let columns = [first[lane] as usize + edge - 1, last[lane] as usize - edge];
-                    [above, below].map(|row| columns.map(|column| row + column))
-                };
+            &Rects::Each { columns: [left, right], rows: [top, bottom] } => {
                 // SAFETY: as the caller's.
-                unsafe { sums_between(rings, of_lane) }
+                unsafe {
+                    let edge = Floats::splat(edge as f32);
+                    let before = edge - Floats::splat(1.0);
+                    let [left, right] = [left + before, right - edge];
+                    let above = rings.starts_near(top + before);
+                    let below = rings.starts_near(bottom - edge);
+                    let eight = Floats::splat(8.0);
+                    let places = [
+                        [indices(eight * (above + left)), indices(eight * (above + right))],
+                        [indices(eight * (below + left)), indices(eight * (below + right))],
+                    ];
+                    let places = one_by_one(&places);
+                    let of_lane = |lane: usize| {
+                        let [[a, b], [c, d]] = places;
+                        [[a[lane] as usize, b[lane] as usize], [c[lane] as usize, d[lane] as usize]]
+                    };
+                    sums_between(rings, of_lane)
+                }
             }
         }
     }
@@ -140,95 +164,131 @@ impl Rects {
     /// # Safety
     /// As [`Rects::sums`].
     #[inline(always)]
-    pub unsafe fn ends<S: Groups, const N: usize>(
-        &self,
-        rings: &Rings<N>,
-        line: usize,
-    ) -> [Floats<S>; 3] {
-        let (points, plane) = (rings.points().as_ptr(), rings.stride());
-        match self {
-            &Rects::Alike { radius, place } => {
-                let rows = rings.rows_of(radius);
-                let [top, middle, bottom] = rows.ends;
-                let [from, to, span] = if line == 0 {
-                    [middle + place - radius, middle + place + radius, 2 * radius]
-                } else {
-                    [top + place, bottom + place, rows.last - rows.first]
-                };
-                let at = |end: usize, field: usize| points.wrapping_add(end + field * plane);
-                // SAFETY: as the caller's.
-                unsafe {
-                    let dx = Floats::<S>::load(at(to, 0)) - Floats::load(at(from, 0));
-                    let dy = Floats::<S>::load(at(to, 1)) - Floats::load(at(from, 1));
+    pub unsafe fn ends<const N: usize>(&self, rings: &Rings<N>, line: usize) -> [Floats<S>; 3] {
+        let (points, plane) = (rings.points(), rings.plane_of_points());
+        // SAFETY: as the caller's.
+        unsafe {
+            match self {
+                &Rects::Alike { rows, place } => {
+                    let (ends, span) = rows.line(place, line);
+                    let [from, to] = ends.map(|end| points.wrapping_add(end));
+                    let dx = Floats::load(to) - Floats::load(from);
+                    let [from, to] = [from, to].map(|end| end.wrapping_add(plane));
+                    let dy = Floats::load(to) - Floats::load(from);
                     [dx, dy, Floats::splat(span as f32)]
                 }
-            }
-            Rects::Each { radii, first, last } => {
-                let mut fields = [[0.0; GROUP]; 3];
-                for lane in 0..GROUP {
-                    let (first, last) = (first[lane] as usize, last[lane] as usize);
-                    let rows = rings.rows_of(radii[lane] as usize);
-                    let [top, middle, bottom] = rows.ends;
-                    let column = (first + last) / 2;
-                    let [from, to, span] = if line == 0 {
-                        [middle + first, middle + last, last - first]
+                &Rects::Each { columns, rows } => {
+                    let (columns, rows) = if line == 0 {
+                        (columns, [middle(rows); 2])
                     } else {
-                        [top + column, bottom + column, rows.last - rows.first]
+                        ([middle(columns); 2], rows)
                     };
-                    for field in 0..2 {
-                        // SAFETY: as the caller's.
-                        let at = |end: usize| unsafe { *points.wrapping_add(end + field * plane) };
-                        fields[field][lane] = at(to) - at(from);
+                    let mut ends = [[0; GROUP]; 2];
+                    for end in 0..2 {
+                        let row = Floats::splat(4.0) * rings.starts_near(rows[end]);
+                        // Floats do not hold the place.
+                        let place = S::add_i(S::truncate_i(row.0), S::truncate_i(columns[end].0));
+                        S::store_i(ends[end].as_mut_ptr(), place);
                     }
-                    fields[2][lane] = span as f32;
-                }
-                // SAFETY: as the caller's; there are so many.
-                unsafe {
-                    let load = |field: usize| Floats::load(fields[field].as_ptr());
-                    [load(0), load(1), load(2)]
+                    let ends = one_by_one(&ends);
+                    let mut fields = [[0.0; GROUP]; 2];
+                    for lane in 0..GROUP {
+                        let end = |end: usize| points.wrapping_add(ends[end][lane] as usize);
+                        let (from, to) = (end(0), end(1));
+                        fields[0][lane] = *to - *from;
+                        fields[1][lane] = *to.wrapping_add(plane) - *from.wrapping_add(plane);
+                    }
+                    let span = columns[1] - columns[0] + rows[1] - rows[0];
+                    [Floats::load(fields[0].as_ptr()), Floats::load(fields[1].as_ptr()), span]
                 }
             }
         }
     }
 
-    /// Of a window's middle row (`line` 0) or column the outermost points that are there, and how far apart these are; none
-    /// if there are not two.
+    /// The windows, to be looked at one by one.
+    ///
+    /// # Safety
+    /// As [`Rects::sums`].
+    #[inline(always)]
+    pub unsafe fn each(&self) -> Each {
+        // SAFETY: as the caller's.
+        unsafe {
+            let splat = |value: usize| Floats::splat(value as f32);
+            let (columns, rows) = match *self {
+                Rects::Alike { rows: Rows { radius, first, span, .. }, place } => {
+                    let steps = Floats::load(STEPS.as_ptr());
+                    let columns = [splat(place - radius) + steps, splat(place + radius) + steps];
+                    (columns, [splat(first), splat(first + span)])
+                }
+                Rects::Each { columns, rows } => (columns, rows),
+            };
+            let [left, right] = columns;
+            let [top, bottom] = rows;
+            Each { columns: [indices(left), indices(right)], rows: [indices(top), indices(bottom)] }
+        }
+    }
+}
+
+/// The first and last columns, as places, and rows of eight windows.
+pub(crate) struct Each {
+    columns: [Indices; 2],
+    rows: [Indices; 2],
+}
+
+impl Each {
+    /// The outermost points of a window's middle row (`line` 0) or column that are there, and how far apart these are; none if
+    /// there are not two.
     pub fn outermost<const N: usize>(
         &self,
         rings: &Rings<N>,
         line: usize,
         lane: usize,
     ) -> Option<([Counted; 2], f32)> {
-        let (radius, left, right) = match self {
-            Rects::Alike { radius, place } => {
-                (*radius, place + lane - radius, place + lane + radius)
-            }
-            Rects::Each { radii, first, last } => {
-                (radii[lane] as usize, first[lane] as usize, last[lane] as usize)
-            }
-        };
-        let Rows { first, last, ends: [top, middle, bottom], .. } = rings.rows_of(radius);
-        let (mut a, mut b, step, mut span) = if line == 0 {
-            (middle + left, middle + right, 1, right - left)
+        let of_lane = |ends: &[Indices; 2]| [ends[0][lane] as usize, ends[1][lane] as usize];
+        let (columns, rows) = (of_lane(&self.columns), of_lane(&self.rows));
+        let middle = |[first, last]: [usize; 2]| (first + last) / 2;
+        let ends = if line == 0 {
+            let y = middle(rows);
+            rings.presence.of_row(y, columns)?.map(|x| (x, y))
         } else {
-            let column = (left + right) / 2;
-            (top + column, bottom + column, rings.row_of_points(), last - first)
+            let x = middle(columns);
+            rings.presence.of_column(x, rows)?.map(|y| (x, y))
         };
-        let (points, length) = (rings.points(), rings.points().len());
-        let is_missing = |at: usize| points[at + WEIGHT * rings.stride()] == 0.0;
-        while is_missing(a) && span > 0 {
-            (a, span) = (a + step, span - 1);
-            a -= if a >= length { length } else { 0 };
-        }
-        while is_missing(b) && span > 0 {
-            (b, span) = (if b < step { b + length } else { b } - step, span - 1);
-        }
-        let point = |at: usize| std::array::from_fn(|field| points[at + field * rings.stride()]);
-        (span > 0).then(|| ([point(a), point(b)], span as f32))
+        let [(left, top), (right, bottom)] = ends;
+        let span = right - left + bottom - top;
+        (span > 0).then(|| (ends.map(|(x, y)| rings.point(x, y)), span as f32))
     }
 }
 
-/// A window's corners: above and below, left and right.
+/// The one in the middle between whole numbers, or before the middle.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn middle<S: Groups>([first, last]: [Floats<S>; 2]) -> Floats<S> {
+    // SAFETY: as the caller's.
+    unsafe { first + Floats(S::truncate(((last - first) * Floats::splat(0.5)).0)) }
+}
+
+/// Whole numbers, as indices.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn indices<S: Groups>(places: Floats<S>) -> Indices {
+    let mut indices = [0; GROUP];
+    // SAFETY: as the caller's.
+    unsafe { S::store_i(indices.as_mut_ptr(), S::truncate_i(places.0)) };
+    indices
+}
+
+/// Has indices loaded one by one: to take them out of vectors takes longer.
+#[inline(always)]
+fn one_by_one<T>(indices: &T) -> &T {
+    black_box(indices)
+}
+
+/// A window's corners, above and below, left and right: where their eight channels are.
 type Corners = [[usize; 2]; 2];
 
 /// The sums between the corners of eight windows.
@@ -280,8 +340,8 @@ unsafe fn sums_between<S: Groups, const N: usize>(
 unsafe fn along_eight<S: Groups>(eights: *const f64, [left, right]: [usize; 2]) -> S::D {
     // SAFETY: as the caller's.
     unsafe {
-        let left = S::load_d(eights.wrapping_add(8 * left));
-        S::sub_d(S::load_d(eights.wrapping_add(8 * right)), left)
+        let left = S::load_d(eights.wrapping_add(left));
+        S::sub_d(S::load_d(eights.wrapping_add(right)), left)
     }
 }
 
@@ -293,7 +353,8 @@ unsafe fn along_eight<S: Groups>(eights: *const f64, [left, right]: [usize; 2]) 
 unsafe fn along_four<S: Groups>(fours: *const f64, [first, second]: [[usize; 2]; 2]) -> S::D {
     // SAFETY: as the caller's.
     unsafe {
-        let place = |half: usize, end: usize| fours.wrapping_add(4 * [first, second][half][end]);
+        let place =
+            |half: usize, end: usize| fours.wrapping_byte_add(4 * [first, second][half][end]);
         let left = S::load_fours_d(|half| place(half, 0));
         S::sub_d(S::load_fours_d(|half| place(half, 1)), left)
     }

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::integrals::{Rings, WEIGHT, reached, rows_of_rings};
 use super::layers::{Layer, Waiting, with_fraction};
 use super::methods::Sums;
-use super::rects::{Pixels, Rects};
+use super::rects::{Pixels, Rects, Rows};
 use crate::cloud::Points;
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::fast::lanes::LANES;
@@ -58,6 +58,9 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let Range { start: top, end: bottom } = reached(&self.rows, reach, height);
         let count = columns.len() * (bottom - top);
         rings.start(columns, top, rows_of_rings(reach, height), layer);
+        if M::ENDS {
+            rings.start_presence();
+        }
         if layer.is_first && layer.hides_some() {
             let [columns, rows] =
                 [&self.columns, &self.rows].map(|all| all.len().div_ceil(self.step));
@@ -65,13 +68,13 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         }
         let mut run = Run::default();
         // SAFETY: as the caller's.
-        unsafe { self.read::<S, N>(rings, top) };
+        unsafe { self.read::<S, M, N>(rings, top) };
         let mut next = top;
         for y in self.rows.clone().step_by(self.step) {
             while next < (middle(y, self.step, height) + reach + 1).min(bottom) {
                 if next + 1 < height {
                     // SAFETY: as the caller's.
-                    unsafe { self.read::<S, N>(rings, next + 1) };
+                    unsafe { self.read::<S, M, N>(rings, next + 1) };
                 } else {
                     rings.read_none(next + 1);
                 }
@@ -79,7 +82,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 unsafe { rings.push::<S>(method, next) };
                 next += 1;
             }
-            rings.aim(middle(y, self.step, height), reach, M::EDGE, height);
+            rings.aim(middle(y, self.step, height), height);
             let error = M::error(rings.total(next - 1), count, rings.largest);
             // SAFETY: as the caller's.
             unsafe { self.row::<S, M, N, PARTIAL>(rings, waiting, sink, &mut run, y, error) };
@@ -92,9 +95,14 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn read<S: Groups, const N: usize>(&self, rings: &mut Rings<N>, y: usize) {
+    unsafe fn read<S: Groups, M: Sums<N>, const N: usize>(&self, rings: &mut Rings<N>, y: usize) {
         // SAFETY: as the caller's.
-        unsafe { rings.read::<S::Widest>(self.points, (self.row)(y).0, y, self.whole_points) };
+        unsafe {
+            rings.read::<S::Widest>(self.points, (self.row)(y).0, y, self.whole_points);
+            if M::ENDS {
+                rings.note_presence::<S::Widest>(y);
+            }
+        }
     }
 
     /// A point of a layer: sums about it lose less.
@@ -125,6 +133,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let radii = (self.row)(y).1;
         let step = self.step;
         let points = rings.around(middle(y, step, height));
+        let mut rows = Rows::new(rings, 0, M::EDGE);
         for start in self.columns.clone().step_by(RUN * step) {
             run.start = start;
             run.lanes = [0; RUN / LANES];
@@ -151,8 +160,11 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                     run.lanes[pair] |= windows << shift;
                     // Behind the last column radii mean nothing.
                     let eight = S::and(S::mask(windows), eight);
-                    let rects = Rects::new::<S, N>(rings, &pixels, Floats(eight), windows);
-                    let sums = rects.sums::<S, N>(rings, M::EDGE);
+                    let rects = {
+                        let last = (step == 1).then_some(&mut rows);
+                        Rects::new(rings, &pixels, Floats(eight), windows, last)
+                    };
+                    let sums = rects.sums(rings, M::EDGE);
                     let own = points.at(rings.place(pixels.x));
                     if PARTIAL && layer.hides_some() {
                         let lanes = with_hidden::<S, M, N>(&sums, &rects, rings, windows)
@@ -246,7 +258,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
 #[inline(always)]
 unsafe fn with_hidden<S: Groups, M: Sums<N>, const N: usize>(
     sums: &[Doubles<S>; N],
-    rects: &Rects,
+    rects: &Rects<S>,
     rings: &Rings<N>,
     lanes: u32,
 ) -> u32 {
@@ -255,8 +267,10 @@ unsafe fn with_hidden<S: Groups, M: Sums<N>, const N: usize>(
     let mut hidden = unsafe { with_fraction(a) | with_fraction(b) };
     // A missing point beside one at the end of a middle row or column leaves no difference with it.
     if M::ENDS {
+        // SAFETY: as the caller's.
+        let each = unsafe { rects.each() };
         let is_hidden = |lane: &usize| {
-            let ends = [0, 1].map(|line| rects.outermost(rings, line, *lane));
+            let ends = [0, 1].map(|line| each.outermost(rings, line, *lane));
             ends.iter().flatten().any(|(ends, _)| ends.iter().any(|end| end[WEIGHT] < 1.0))
         };
         hidden |= Bits(lanes & !hidden).filter(is_hidden).fold(0, |all, lane| all | 1 << lane);

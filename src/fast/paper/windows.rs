@@ -17,8 +17,8 @@ use crate::simd::Simd;
 /// More than any distance that matters; its square still fits a float exactly enough to stay the larger.
 const FAR: f32 = 1e6;
 
-/// Columns that are looked at before it is asked whether to go on.
-const AT_ONCE: usize = 4;
+/// Columns that are looked at together, or passed over if none of them has a change that is near enough.
+const AT_ONCE: usize = 8;
 
 /// How far, in pixels, a depth change can be that decides a window.
 pub(crate) fn reach(options: &PaperOptions) -> usize {
@@ -40,8 +40,9 @@ pub(crate) struct Sweep {
     right: Buffer<f32>,
     /// The row below: distances along the columns.
     below: Buffer<f32>,
-    /// Squares of them, with room before and after.
+    /// Squares of them, with room before and after; and the least of each and the next ones, `AT_ONCE` in all.
     squares: Buffer<f32>,
+    least: Buffer<f32>,
     /// The square of every distance along a row, from 1 on, in all lanes.
     along: Buffer<Lanes>,
 }
@@ -79,8 +80,8 @@ impl Rows<'_> {
 impl Sweep {
     /// Bytes held.
     pub fn size(&self) -> usize {
-        let Sweep { last, gap, right, below, squares, along } = self;
-        let rows = [last, gap, right, below, squares];
+        let Sweep { last, gap, right, below, squares, least, along } = self;
+        let rows = [last, gap, right, below, squares, least];
         rows.map(Buffer::size).into_iter().sum::<usize>() + along.size()
     }
 
@@ -91,7 +92,8 @@ impl Sweep {
         for buffer in [&mut self.last, &mut self.gap, &mut self.right, &mut self.below] {
             buffer.grow(length)?;
         }
-        self.squares.grow(length + 2 * margin)
+        self.squares.grow(length + 2 * margin)?;
+        self.least.grow(length + 2 * margin)
     }
 
     /// Fills the map with the windows' radii, whole numbers of pixels, 0 for none. Returns the largest of the own rows.
@@ -203,10 +205,13 @@ impl Sweep {
     ) -> f32 {
         let length = row_length(rows.width);
         let inside = length - LANES;
-        let (before, after) = (&mut self.below[..length], &mut self.squares[..length + 2 * margin]);
-        let (below, squares, along) = (before, after, &self.along[..margin]);
+        let Sweep { below, squares, least, along, .. } = self;
+        let (below, along) = (&mut below[..length], &along[..margin]);
+        let squares = &mut squares[..length + 2 * margin];
+        let least = &mut least[..length + 2 * margin];
         below.fill(FAR);
         squares.fill(FAR * FAR);
+        least.fill(FAR * FAR);
         // SAFETY: as the caller's; the margins are as wide as the search is.
         unsafe {
             let mut largest = S::splat(0.0);
@@ -222,12 +227,13 @@ impl Sweep {
                 }
                 // No depth change lies behind the row's end.
                 squares[margin + rows.width..].fill(FAR * FAR);
+                least_of_next::<S>(squares, least);
                 let depths = rows.depths(y).as_ptr();
                 let mut largest_of_row = S::splat(0.0);
                 for x in (0..inside).step_by(LANES) {
                     let depth = S::load(depths.add(x));
-                    let squares = squares.as_ptr().add(margin + x);
-                    let radius = radius::<S>(depth, squares, along, options);
+                    let columns = [&*squares, &*least].map(|row| row.as_ptr().add(margin + x));
+                    let radius = radius::<S>(depth, columns, along, options);
                     largest_of_row = S::max(radius, largest_of_row);
                     S::store(map.add(x), radius);
                 }
@@ -238,6 +244,29 @@ impl Sweep {
             let mut lanes = [0.0; LANES];
             S::store(lanes.as_mut_ptr(), largest);
             lanes.into_iter().fold(0.0, f32::max)
+        }
+    }
+}
+
+/// Finds the least of each and the next ones, [`AT_ONCE`] in all; the last ones of a row are not given.
+///
+/// # Safety
+/// The processor has the instruction set of `S`; both have whole groups of lanes.
+#[inline(always)]
+unsafe fn least_of_next<S: Simd>(values: &[f32], least: &mut [f32]) {
+    const { assert!(AT_ONCE == 8) };
+    let from = values.as_ptr();
+    let to = least[..values.len()].as_mut_ptr();
+    // SAFETY: as the caller's; the lanes, and those next to them, are inside.
+    unsafe {
+        for x in (0..values.len() - LANES).step_by(LANES) {
+            S::store(to.add(x), S::min(S::load(from.add(x)), S::load(from.add(x + 1))));
+        }
+        for next in [2, 4] {
+            for x in (0..values.len() - LANES).step_by(LANES) {
+                let at = to.add(x);
+                S::store(at, S::min(S::load(at), S::load(at.add(next))));
+            }
         }
     }
 }
@@ -295,14 +324,15 @@ unsafe fn is_change<S: Simd>(
 }
 
 /// `paper::smoothing_area::smoothing_radius`, whole pixels, of sixteen pixels; `squares` are the squared distances to
-/// the changes of their own columns, as far to both sides as matters.
+/// the changes of their own columns, and `nearby` the least of [`AT_ONCE`] of them from there on, as far to both sides
+/// as matters.
 ///
 /// # Safety
-/// The processor has the instruction set of `S`; `squares` is readable [`reach`] to both sides of them.
+/// The processor has the instruction set of `S`; both are readable for the [`margin`] to both sides of them.
 #[inline(always)]
 unsafe fn radius<S: Simd>(
     depth: S::F,
-    squares: *const f32,
+    [squares, nearby]: [*const f32; 2],
     along: &[Lanes],
     options: &PaperOptions,
 ) -> S::F {
@@ -318,13 +348,17 @@ unsafe fn radius<S: Simd>(
         let enough = S::and(there, S::mul(S::mul(more, more), S::splat(2.0)));
 
         let mut nearest = S::load(squares);
-        let mut column = 0;
-        for along in along.chunks_exact(AT_ONCE) {
-            if S::bits(S::lt(along[0].load::<S>(), S::min(nearest, enough))) == 0 {
+        for (passed, along) in (0..).step_by(AT_ONCE).zip(along.chunks_exact(AT_ONCE)) {
+            let (matters, first) = (S::min(nearest, enough), along[0].load::<S>());
+            if S::bits(S::lt(first, matters)) == 0 {
                 break;
             }
-            for along in along {
-                column += 1;
+            let left = S::load(nearby.sub(passed + AT_ONCE));
+            let right = S::load(nearby.add(passed + 1));
+            if S::bits(S::lt(S::add(S::min(left, right), first), matters)) == 0 {
+                continue;
+            }
+            for (column, along) in (passed + 1..).zip(along) {
                 let (left, right) = (S::load(squares.sub(column)), S::load(squares.add(column)));
                 nearest = S::min(nearest, S::add(S::min(left, right), along.load::<S>()));
             }
