@@ -49,6 +49,16 @@ impl<S: Simd> Floats<S> {
         Floats(unsafe { S::splat(value) })
     }
 
+    /// A whole number up to 2^24: floats hold it.
+    ///
+    /// # Safety
+    /// As [`Floats::splat`].
+    #[inline(always)]
+    pub unsafe fn whole(value: usize) -> Self {
+        // One instruction, unlike from other integers. SAFETY: as the caller's.
+        unsafe { Self::splat(value as i32 as f32) }
+    }
+
     /// # Safety
     /// The processor has the instruction set of `S`; there are so many floats.
     #[inline(always)]

@@ -146,6 +146,30 @@ impl Groups for Avx512 {
         unsafe { [_mm512_shuffle_f64x2::<0x44>(a, b), _mm512_shuffle_f64x2::<0xee>(a, b)] }
     }
     #[inline(always)]
+    unsafe fn load_pairs_d(place: impl Fn(usize) -> *const f64) -> Self::D {
+        unsafe {
+            let low = _mm256_loadu2_m128d(place(1), place(0));
+            let high = _mm256_loadu2_m128d(place(3), place(2));
+            _mm512_insertf64x4::<1>(_mm512_castpd256_pd512(low), high)
+        }
+    }
+    #[inline(always)]
+    unsafe fn pair_d(a: Self::D, b: Self::D) -> [Self::D; 2] {
+        unsafe {
+            let first = _mm512_setr_epi64(0, 8, 1, 9, 2, 10, 3, 11);
+            let last = _mm512_setr_epi64(4, 12, 5, 13, 6, 14, 7, 15);
+            [_mm512_permutex2var_pd(a, first, b), _mm512_permutex2var_pd(a, last, b)]
+        }
+    }
+    #[inline(always)]
+    unsafe fn unpair_d(first: Self::D, last: Self::D) -> [Self::D; 2] {
+        unsafe {
+            let even = _mm512_setr_epi64(0, 2, 4, 6, 8, 10, 12, 14);
+            let odd = _mm512_setr_epi64(1, 3, 5, 7, 9, 11, 13, 15);
+            [_mm512_permutex2var_pd(first, even, last), _mm512_permutex2var_pd(first, odd, last)]
+        }
+    }
+    #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
         unsafe {
             // Among lanes 0 to 3 and 4 to 7 each gets the one before, then the one two before.

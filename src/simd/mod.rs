@@ -243,6 +243,13 @@ pub(crate) trait Groups: Along {
     /// The lower halves of both, and the upper halves.
     unsafe fn join_halves_d(a: Self::D, b: Self::D) -> [Self::D; 2];
 
+    /// Two lanes from each of four places.
+    unsafe fn load_pairs_d(place: impl Fn(usize) -> *const f64) -> Self::D;
+    /// Pairs of the lanes of both: the first four, and the last four.
+    unsafe fn pair_d(a: Self::D, b: Self::D) -> [Self::D; 2];
+    /// Undoes [`Groups::pair_d`].
+    unsafe fn unpair_d(first: Self::D, last: Self::D) -> [Self::D; 2];
+
     /// Lane i of row j becomes lane j of row i.
     #[inline(always)]
     unsafe fn transpose_d([a, b, c, d, e, f, g, h]: [Self::D; 8]) -> [Self::D; 8] {

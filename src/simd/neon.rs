@@ -399,6 +399,35 @@ impl Groups for Neon {
         [[a[0], a[1], b[0], b[1]], [a[2], a[3], b[2], b[3]]]
     }
     #[inline(always)]
+    unsafe fn load_pairs_d(place: impl Fn(usize) -> *const f64) -> Self::D {
+        unsafe {
+            [vld1q_f64(place(0)), vld1q_f64(place(1)), vld1q_f64(place(2)), vld1q_f64(place(3))]
+        }
+    }
+    #[inline(always)]
+    unsafe fn pair_d(a: Self::D, b: Self::D) -> [Self::D; 2] {
+        let mut pairs = [a, b];
+        for i in 0..4 {
+            unsafe {
+                pairs[i / 2][i % 2 * 2] = vtrn1q_f64(a[i], b[i]);
+                pairs[i / 2][i % 2 * 2 + 1] = vtrn2q_f64(a[i], b[i]);
+            }
+        }
+        pairs
+    }
+    #[inline(always)]
+    unsafe fn unpair_d(first: Self::D, last: Self::D) -> [Self::D; 2] {
+        let mut lanes = [first, last];
+        for i in 0..4 {
+            unsafe {
+                let two = &[first, last][i / 2][i % 2 * 2..];
+                lanes[0][i] = vtrn1q_f64(two[0], two[1]);
+                lanes[1][i] = vtrn2q_f64(two[0], two[1]);
+            }
+        }
+        lanes
+    }
+    #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
         /// Four lanes: each gets the one before, then the one two before.
         #[inline(always)]

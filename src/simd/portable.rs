@@ -308,6 +308,21 @@ impl Groups for Portable {
         [half(0), half(4)]
     }
     #[inline(always)]
+    unsafe fn load_pairs_d(place: impl Fn(usize) -> *const f64) -> D {
+        // SAFETY: promised by the caller.
+        std::array::from_fn(|l| unsafe { place(l / 2).add(l % 2).read() })
+    }
+    #[inline(always)]
+    unsafe fn pair_d(a: D, b: D) -> [D; 2] {
+        let half = |first: usize| std::array::from_fn(|l| [a, b][l % 2][first + l / 2]);
+        [half(0), half(4)]
+    }
+    #[inline(always)]
+    unsafe fn unpair_d(first: D, last: D) -> [D; 2] {
+        let lanes = |of: usize| std::array::from_fn(|l| [first, last][l / 4][l % 4 * 2 + of]);
+        [lanes(0), lanes(1)]
+    }
+    #[inline(always)]
     unsafe fn prefix_sum_d(a: D) -> D {
         prefix_sum(a, |a, b| a + b)
     }

@@ -158,6 +158,9 @@ unsafe fn of_groups<S: Groups>(a: &[f32; 16], b: &[f32; 16]) -> Results {
         let first = fours.as_mut_ptr();
         S::store_fours_d(dx, |half| first.add(1 + 5 * half));
         results.doubles::<S>([S::load_d(fours.as_ptr()), S::load_d(fours.as_ptr().add(2))]);
+        results.doubles::<S>([S::load_pairs_d(|i| doubles.as_ptr().add(1 + 4 * i))]);
+        results.doubles::<S>(S::pair_d(dx, dy));
+        results.doubles::<S>(S::unpair_d(dx, dy));
         results.doubles::<S>(S::transpose_fours_d([dx, dy, S::add_d(dx, dx), S::add_d(dy, dy)]));
         let rows = [0, 1, 2, 3, 4, 5, 6, 7].map(|row| S::load_d(doubles.as_ptr().add(row)));
         results.doubles::<S>(S::transpose_d(rows));

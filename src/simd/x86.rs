@@ -377,6 +377,37 @@ impl Groups for Sse2 {
         [[a[0], a[1], b[0], b[1]], [a[2], a[3], b[2], b[3]]]
     }
     #[inline(always)]
+    unsafe fn load_pairs_d(place: impl Fn(usize) -> *const f64) -> Self::D {
+        let mut pairs = [unsafe { _mm_setzero_pd() }; 4];
+        for (i, pair) in pairs.iter_mut().enumerate() {
+            *pair = unsafe { _mm_loadu_pd(place(i)) };
+        }
+        pairs
+    }
+    #[inline(always)]
+    unsafe fn pair_d(a: Self::D, b: Self::D) -> [Self::D; 2] {
+        let mut pairs = [a, b];
+        for i in 0..4 {
+            unsafe {
+                pairs[i / 2][i % 2 * 2] = _mm_unpacklo_pd(a[i], b[i]);
+                pairs[i / 2][i % 2 * 2 + 1] = _mm_unpackhi_pd(a[i], b[i]);
+            }
+        }
+        pairs
+    }
+    #[inline(always)]
+    unsafe fn unpair_d(first: Self::D, last: Self::D) -> [Self::D; 2] {
+        let mut lanes = [first, last];
+        for i in 0..4 {
+            unsafe {
+                let two = &[first, last][i / 2][i % 2 * 2..];
+                lanes[0][i] = _mm_unpacklo_pd(two[0], two[1]);
+                lanes[1][i] = _mm_unpackhi_pd(two[0], two[1]);
+            }
+        }
+        lanes
+    }
+    #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
         /// Four lanes: each gets the one before, then the one two before.
         #[inline(always)]
@@ -691,6 +722,38 @@ impl Groups for Avx2 {
     #[inline(always)]
     unsafe fn join_halves_d(a: Self::D, b: Self::D) -> [Self::D; 2] {
         [[a[0], b[0]], [a[1], b[1]]]
+    }
+    #[inline(always)]
+    unsafe fn load_pairs_d(place: impl Fn(usize) -> *const f64) -> Self::D {
+        unsafe {
+            [_mm256_loadu2_m128d(place(1), place(0)), _mm256_loadu2_m128d(place(3), place(2))]
+        }
+    }
+    #[inline(always)]
+    unsafe fn pair_d(a: Self::D, b: Self::D) -> [Self::D; 2] {
+        let mut pairs = [a, b];
+        for half in 0..2 {
+            unsafe {
+                let even = _mm256_unpacklo_pd(a[half], b[half]);
+                let odd = _mm256_unpackhi_pd(a[half], b[half]);
+                pairs[half][0] = _mm256_permute2f128_pd::<0x20>(even, odd);
+                pairs[half][1] = _mm256_permute2f128_pd::<0x31>(even, odd);
+            }
+        }
+        pairs
+    }
+    #[inline(always)]
+    unsafe fn unpair_d(first: Self::D, last: Self::D) -> [Self::D; 2] {
+        let mut lanes = [first, last];
+        for (half, [low, high]) in [first, last].into_iter().enumerate() {
+            unsafe {
+                let even = _mm256_permute2f128_pd::<0x20>(low, high);
+                let odd = _mm256_permute2f128_pd::<0x31>(low, high);
+                lanes[0][half] = _mm256_unpacklo_pd(even, odd);
+                lanes[1][half] = _mm256_unpackhi_pd(even, odd);
+            }
+        }
+        lanes
     }
     #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {

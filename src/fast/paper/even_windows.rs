@@ -280,7 +280,7 @@ impl EvenTile<'_> {
         // SAFETY: as the caller's.
         unsafe {
             let rects = Rects::new(rings, &pixels, radii, lanes, None);
-            let [sx, sy, sr, n, xx, yy, rr, xy, yr, xr, ..] = rects.sums(rings, 0);
+            let [sx, sy, sr, n, xx, yy, rr, xy, yr, xr] = rects.sums(rings, 0);
             let share = Doubles::splat(1.0) / n;
             let (mx, my, mr) = (sx * share, sy * share, sr * share);
             let (xx, xy, yy) = (xx - sx * mx, xy - sx * my, yy - sy * my);

@@ -35,9 +35,10 @@ pub(crate) trait Channels<const N: usize> {
 #[derive(Debug, Default)]
 pub(crate) struct Rings<const N: usize> {
     /// Of the columns up to this one and the rows up to this one: eight channels, which are a line of the cache, and four
-    /// that are left.
+    /// or two that are left.
     eights: Buffer<[f64; 8]>,
     fours: Buffer<[f64; 4]>,
+    pairs: Buffer<[f64; 2]>,
     /// Row by row four planes: the points' fields.
     points: Buffer<f32>,
     columns: Range<usize>,
@@ -96,24 +97,26 @@ impl<const N: usize> Rings<N> {
     /// Bytes that a column takes in a row.
     pub const COLUMN: usize = size_of::<[f64; N]>() + size_of::<Counted>();
 
-    /// Whether there are eight channels, and four more or alone.
+    /// Whether there are eight channels, and four or two more or alone.
     pub(super) const HAS_EIGHT: bool = {
-        assert!(N.is_multiple_of(4) && N < 16);
+        assert!(N.is_multiple_of(2) && N < 16 && N % 8 < 6);
         N >= 8
     };
     pub(super) const HAS_FOUR: bool = N % 8 == 4;
+    pub(super) const HAS_PAIR: bool = N % 8 == 2;
 
     /// Bytes held.
     pub fn size(&self) -> usize {
-        let sums = self.eights.size() + self.fours.size();
+        let sums = self.eights.size() + self.fours.size() + self.pairs.size();
         sums + self.points.size() + self.presence.size()
     }
 
     /// Makes room for so many elements.
     pub fn reserve(&mut self, elements: usize) -> Result<(), Error> {
         self.points.grow(size_of::<Counted>() / size_of::<f32>() * (elements + BLOCK * GROUP))?;
-        self.eights.grow(N / 8 * elements)?;
-        self.fours.grow(N % 8 / 4 * elements)
+        self.eights.grow(usize::from(Self::HAS_EIGHT) * elements)?;
+        self.fours.grow(usize::from(Self::HAS_FOUR) * elements)?;
+        self.pairs.grow(usize::from(Self::HAS_PAIR) * elements)
     }
 
     /// Starts over at row `top` of a layer's points, with rings of so many rows; there is room.
@@ -122,12 +125,20 @@ impl<const N: usize> Rings<N> {
         (self.layer, self.nearest_hidden, self.largest) = (*layer, f32::INFINITY, 0.0);
         let length = 4 * self.rows * self.stride;
         self.points[..length].fill(0.0);
-        let above = self.row(top + self.rows - 1);
+        self.clear(self.row(top + self.rows - 1));
+    }
+
+    /// Has sums of nothing.
+    #[inline(always)]
+    fn clear(&mut self, elements: Range<usize>) {
         if Self::HAS_EIGHT {
-            self.eights[above.clone()].fill([0.0; 8]);
+            self.eights[elements.clone()].fill([0.0; 8]);
         }
         if Self::HAS_FOUR {
-            self.fours[above].fill([0.0; 4]);
+            self.fours[elements.clone()].fill([0.0; 4]);
+        }
+        if Self::HAS_PAIR {
+            self.pairs[elements].fill([0.0; 2]);
         }
     }
 
@@ -180,10 +191,10 @@ impl<const N: usize> Rings<N> {
         self.points[4 * self.start_of(y)..][..4 * self.stride].as_ptr()
     }
 
-    /// The sums of eight channels, and of four.
+    /// The sums of eight channels, of four, and of two.
     #[inline(always)]
-    pub fn sums(&self) -> (*const f64, *const f64) {
-        (self.eights.as_ptr().cast(), self.fours.as_ptr().cast())
+    pub fn sums(&self) -> [*const f64; 3] {
+        [self.eights.as_ptr().cast(), self.fours.as_ptr().cast(), self.pairs.as_ptr().cast()]
     }
 
     /// The points' fields: row by row four planes.
@@ -250,11 +261,11 @@ impl<const N: usize> Rings<N> {
     pub unsafe fn starts_near<S: Groups>(&self, y: Floats<S>) -> Floats<S> {
         // SAFETY: as the caller's; floats hold places in rings exactly.
         unsafe {
-            let (rows, zero) = (Floats::<S>::splat(self.rows as f32), Floats::<S>::splat(0.0));
-            let row = y - Floats::splat(self.aimed.first as f32);
+            let (rows, zero) = (Floats::<S>::whole(self.rows), Floats::<S>::splat(0.0));
+            let row = y - Floats::whole(self.aimed.first);
             let row = row + Floats(S::and(S::lt(row.0, zero.0), rows.0));
             let row = row - Floats(S::and_not(S::lt(row.0, rows.0), rows.0));
-            row * Floats::splat(self.stride as f32)
+            row * Floats::whole(self.stride)
         }
     }
 
@@ -378,35 +389,37 @@ impl<const N: usize> Rings<N> {
         let points = self.around(y);
         let (above, own) = (self.start_above(y), self.start_of(y));
         let length = self.columns.len().next_multiple_of(GROUP);
+        self.clear(own + MARGIN - 1..own + MARGIN);
         let elements = self.rows * self.stride;
         let eights = self.eights[..usize::from(Self::HAS_EIGHT) * elements].as_mut_ptr();
         let fours = self.fours[..usize::from(Self::HAS_FOUR) * elements].as_mut_ptr();
+        let pairs = self.pairs[..usize::from(Self::HAS_PAIR) * elements].as_mut_ptr();
         // SAFETY: as the caller's; groups, and the pixels next to them, lie inside the rows of the rings.
         unsafe {
-            let mut carries = [S::splat_d(0.0); 2];
-            if Self::HAS_EIGHT {
-                eights.add(own + MARGIN - 1).write([0.0; 8]);
-            }
-            if Self::HAS_FOUR {
-                fours.add(own + MARGIN - 1).write([0.0; 4]);
-            }
+            let zero = S::splat_d(0.0);
+            let (mut of_eight, mut of_four, mut of_pair) = (zero, zero, [zero; 2]);
             for x in (MARGIN..MARGIN + length).step_by(GROUP) {
                 let values = channels.of::<S>(&points.at(x));
                 if Self::HAS_EIGHT {
-                    let mut eight = [S::splat_d(0.0); 8];
+                    let mut eight = [zero; 8];
                     for i in 0..8 {
                         eight[i] = values[i].0;
                     }
                     let rows = [eights.add(above + x).cast(), eights.add(own + x).cast()];
-                    push_eight::<S>(eight, rows, &mut carries[0]);
+                    push_eight::<S>(eight, rows, &mut of_eight);
                 }
                 if Self::HAS_FOUR {
-                    let mut four = [S::splat_d(0.0); 4];
+                    let mut four = [zero; 4];
                     for i in 0..4 {
                         four[i] = values[N - 4 + i].0;
                     }
                     let rows = [fours.add(above + x).cast(), fours.add(own + x).cast()];
-                    push_four::<S>(four, rows, &mut carries[1]);
+                    push_four::<S>(four, rows, &mut of_four);
+                }
+                if Self::HAS_PAIR {
+                    let pair = [values[N - 2].0, values[N - 1].0];
+                    let rows = [pairs.add(above + x).cast(), pairs.add(own + x).cast()];
+                    push_pair::<S>(pair, rows, &mut of_pair);
                 }
             }
         }
@@ -416,12 +429,15 @@ impl<const N: usize> Rings<N> {
     pub fn total(&self, y: usize) -> [f64; N] {
         let last = self.start_of(y) + MARGIN + self.columns.len() - 1;
         let mut total = [0.0; N];
-        let (eight, four) = total.split_at_mut(N / 8 * 8);
+        let (eight, rest) = total.split_at_mut(N / 8 * 8);
         if Self::HAS_EIGHT {
             eight.copy_from_slice(&self.eights[last]);
         }
         if Self::HAS_FOUR {
-            four.copy_from_slice(&self.fours[last]);
+            rest.copy_from_slice(&self.fours[last]);
+        }
+        if Self::HAS_PAIR {
+            rest.copy_from_slice(&self.pairs[last]);
         }
         total
     }
@@ -471,6 +487,28 @@ unsafe fn push_four<S: Groups>(values: [S::D; 4], [above, own]: [*mut f64; 2], c
             S::store_fours_d(sum, |half| own.add(at(half)));
         }
         [_, *carry] = S::join_halves_d(along[3], along[3]);
+    }
+}
+
+/// As [`push_eight`], of two channels; `carries` are their sums along the row.
+///
+/// # Safety
+/// As [`push_eight`].
+#[inline(always)]
+unsafe fn push_pair<S: Groups>(
+    values: [S::D; 2],
+    [above, own]: [*mut f64; 2],
+    carries: &mut [S::D; 2],
+) {
+    // SAFETY: as the caller's.
+    unsafe {
+        let first = S::running_sum_d(values[0], &mut carries[0]);
+        let second = S::running_sum_d(values[1], &mut carries[1]);
+        let along = S::pair_d(first, second);
+        for half in 0..2 {
+            let at = 8 * half;
+            S::store_d(own.add(at), S::add_d(along[half], S::load_d(above.add(at))));
+        }
     }
 }
 

@@ -76,8 +76,8 @@ impl CovarianceMatrix {
     }
 }
 
-/// x, y, z, the number of points, xx, yy, zz, xy; yz, zx, and twice the number again: eight and four, as sums are read.
-pub(crate) const MOMENTS: usize = 12;
+/// x, y, z, the number of points, xx, yy, zz, xy; yz, zx: eight and two, as sums are read.
+pub(crate) const MOMENTS: usize = 10;
 
 impl Channels<MOMENTS> for CovarianceMatrix {
     #[inline(always)]
@@ -93,7 +93,7 @@ impl Channels<MOMENTS> for CovarianceMatrix {
                 about[c] = (coordinate - Doubles::splat(self.origin[c])) * count;
             }
             let [x, y, z] = about;
-            [x, y, z, count, x * x, y * y, z * z, x * y, y * z, z * x, count, count]
+            [x, y, z, count, x * x, y * y, z * z, x * y, y * z, z * x]
         }
     }
 }
@@ -122,7 +122,7 @@ impl Sums<MOMENTS> for CovarianceMatrix {
         run: &mut Matrices,
         at: usize,
     ) {
-        let [x, y, z, count, xx, yy, zz, xy, yz, xz, ..] = *sums;
+        let [x, y, z, count, xx, yy, zz, xy, yz, xz] = *sums;
         let sums = [x, y, z, xx, xy, xz, yy, yz, zz];
         // SAFETY: as the caller's.
         unsafe {

@@ -94,12 +94,11 @@ impl<S: Groups> Rects<S> {
         let &Pixels { x, step, width } = pixels;
         // SAFETY: as the caller's; floats hold columns exactly.
         unsafe {
-            let splat = |value: usize| Floats::<S>::splat(value as f32);
             if let Some(rows) = rows {
                 let mut each = [0.0; GROUP];
                 S::store(each.as_mut_ptr(), radii.0);
                 let first = each[lanes.trailing_zeros() as usize % GROUP];
-                let radius = first as usize;
+                let radius = first.to_int_unchecked::<i32>() as usize;
                 let differ = !S::bits(S::eq(radii.0, S::splat(first)));
                 if lanes & differ == 0 && x >= radius && x + GROUP + radius <= width {
                     if rows.radius != radius {
@@ -109,11 +108,11 @@ impl<S: Groups> Rects<S> {
                 }
             }
             let Aimed { y, height, .. } = rings.aimed();
-            let (columns, rows) = (pixels.columns(), splat(y));
+            let (columns, rows) = (pixels.columns(), Floats::whole(y));
             let [left, right] = range(columns, radii, width);
             let [top, bottom] = range(rows, radii, height);
-            let shift = Floats::splat(MARGIN as f32) - splat(rings.left());
-            let one = splat(1);
+            let shift = Floats::whole(MARGIN) - Floats::whole(rings.left());
+            let one = Floats::splat(1.0);
             Rects::Each { columns: [left + shift, right + shift - one], rows: [top, bottom - one] }
         }
     }
@@ -132,12 +131,12 @@ impl<S: Groups> Rects<S> {
                 let of_lane =
                     |lane: usize| corners.map(|row| row.map(|corner| 8 * (corner + lane)));
                 // SAFETY: as the caller's.
-                unsafe { sums_between(rings, of_lane) }
+                unsafe { sums_between::<S, N, true>(rings, of_lane) }
             }
             &Rects::Each { columns: [left, right], rows: [top, bottom] } => {
                 // SAFETY: as the caller's.
                 unsafe {
-                    let edge = Floats::splat(edge as f32);
+                    let edge = Floats::whole(edge);
                     let before = edge - Floats::splat(1.0);
                     let [left, right] = [left + before, right - edge];
                     let above = rings.starts_near(top + before);
@@ -152,7 +151,7 @@ impl<S: Groups> Rects<S> {
                         let [[a, b], [c, d]] = places;
                         [[a[lane] as usize, b[lane] as usize], [c[lane] as usize, d[lane] as usize]]
                     };
-                    sums_between(rings, of_lane)
+                    sums_between::<S, N, false>(rings, of_lane)
                 }
             }
         }
@@ -175,7 +174,7 @@ impl<S: Groups> Rects<S> {
                     let dx = Floats::load(to) - Floats::load(from);
                     let [from, to] = [from, to].map(|end| end.wrapping_add(plane));
                     let dy = Floats::load(to) - Floats::load(from);
-                    [dx, dy, Floats::splat(span as f32)]
+                    [dx, dy, Floats::whole(span)]
                 }
                 &Rects::Each { columns, rows } => {
                     let (columns, rows) = if line == 0 {
@@ -213,12 +212,15 @@ impl<S: Groups> Rects<S> {
     pub unsafe fn each(&self) -> Each {
         // SAFETY: as the caller's.
         unsafe {
-            let splat = |value: usize| Floats::splat(value as f32);
             let (columns, rows) = match *self {
                 Rects::Alike { rows: Rows { radius, first, span, .. }, place } => {
                     let steps = Floats::load(STEPS.as_ptr());
-                    let columns = [splat(place - radius) + steps, splat(place + radius) + steps];
-                    (columns, [splat(first), splat(first + span)])
+                    let [left, right] =
+                        [Floats::whole(place - radius), Floats::whole(place + radius)];
+                    (
+                        [left + steps, right + steps],
+                        [Floats::whole(first), Floats::whole(first + span)],
+                    )
                 }
                 Rects::Each { columns, rows } => (columns, rows),
             };
@@ -291,25 +293,31 @@ fn one_by_one<T>(indices: &T) -> &T {
 /// A window's corners, above and below, left and right: where their eight channels are.
 type Corners = [[usize; 2]; 2];
 
-/// The sums between the corners of eight windows.
+/// The sums between the corners of eight windows, which are of pixels side by side and `ALIKE`, or not.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`; the rings have such elements.
 #[inline(always)]
-unsafe fn sums_between<S: Groups, const N: usize>(
+unsafe fn sums_between<S: Groups, const N: usize, const ALIKE: bool>(
     rings: &Rings<N>,
     corners: impl Fn(usize) -> Corners,
 ) -> [Doubles<S>; N] {
-    let (eights, fours) = rings.sums();
+    let [eights, fours, pairs] = rings.sums();
+    let four = |lane: usize| {
+        corners(lane).map(|row| row.map(|corner| fours.wrapping_byte_add(4 * corner)))
+    };
+    let pair = |lane: usize| {
+        corners(lane).map(|row| row.map(|corner| pairs.wrapping_byte_add(2 * corner)))
+    };
     // SAFETY: as the caller's.
     unsafe {
-        let mut channels = [Doubles::splat(0.0); N];
+        let zero = S::splat_d(0.0);
+        let mut channels = [Doubles(zero); N];
         if Rings::<N>::HAS_EIGHT {
-            let mut windows = [S::splat_d(0.0); GROUP];
+            let mut windows = [zero; GROUP];
             for lane in 0..GROUP {
-                let [above, below] = corners(lane);
-                let above = along_eight::<S>(eights, above);
-                windows[lane] = S::sub_d(along_eight::<S>(eights, below), above);
+                windows[lane] =
+                    between::<S>(corners(lane).map(|row| row.map(|c| eights.wrapping_add(c))));
             }
             let eight = S::transpose_d(windows);
             for i in 0..8 {
@@ -317,46 +325,87 @@ unsafe fn sums_between<S: Groups, const N: usize>(
             }
         }
         if Rings::<N>::HAS_FOUR {
-            let mut windows = [S::splat_d(0.0); 4];
-            for lane in 0..4 {
-                let ([above, below], [next_above, next_below]) = (corners(lane), corners(4 + lane));
-                let above = along_four::<S>(fours, [above, next_above]);
-                windows[lane] = S::sub_d(along_four::<S>(fours, [below, next_below]), above);
+            let mut windows = [zero; 4];
+            if ALIKE {
+                for i in 0..4 {
+                    windows[i] = between::<S>(four(2 * i));
+                }
+                let [a, b, c, d] = windows;
+                let ([a, b], [c, d]) = (S::join_halves_d(a, c), S::join_halves_d(b, d));
+                windows = [a, b, c, d];
+            } else {
+                for lane in 0..4 {
+                    windows[lane] = between_fours::<S>([four(lane), four(4 + lane)]);
+                }
             }
             let four = S::transpose_fours_d(windows);
             for i in 0..4 {
                 channels[N - 4 + i] = Doubles(four[i]);
             }
         }
+        if Rings::<N>::HAS_PAIR {
+            let mut windows = [zero; 2];
+            for half in 0..2 {
+                let first = 4 * half;
+                windows[half] = if ALIKE {
+                    between::<S>(pair(first))
+                } else {
+                    between_pairs::<S>([
+                        pair(first),
+                        pair(first + 1),
+                        pair(first + 2),
+                        pair(first + 3),
+                    ])
+                };
+            }
+            let [first, second] = S::unpair_d(windows[0], windows[1]);
+            [channels[N - 2], channels[N - 1]] = [Doubles(first), Doubles(second)];
+        }
         channels
     }
 }
 
-/// The eight channels between two elements of a row.
+/// A window's corners, where some of their channels are.
+type Ends = [[*const f64; 2]; 2];
+
+/// The sums between corners, of as many channels as there are lanes.
 ///
 /// # Safety
 /// As [`sums_between`].
 #[inline(always)]
-unsafe fn along_eight<S: Groups>(eights: *const f64, [left, right]: [usize; 2]) -> S::D {
+unsafe fn between<S: Groups>([above, below]: Ends) -> S::D {
     // SAFETY: as the caller's.
     unsafe {
-        let left = S::load_d(eights.wrapping_add(left));
-        S::sub_d(S::load_d(eights.wrapping_add(right)), left)
+        let above = S::sub_d(S::load_d(above[1]), S::load_d(above[0]));
+        S::sub_d(S::sub_d(S::load_d(below[1]), S::load_d(below[0])), above)
     }
 }
 
-/// The four channels between two elements of a row, and between two of another.
+/// [`between`], of four channels of two windows.
 ///
 /// # Safety
 /// As [`sums_between`].
 #[inline(always)]
-unsafe fn along_four<S: Groups>(fours: *const f64, [first, second]: [[usize; 2]; 2]) -> S::D {
+unsafe fn between_fours<S: Groups>(windows: [Ends; 2]) -> S::D {
+    let at = |row: usize, end: usize| move |window: usize| windows[window][row][end];
     // SAFETY: as the caller's.
     unsafe {
-        let place =
-            |half: usize, end: usize| fours.wrapping_byte_add(4 * [first, second][half][end]);
-        let left = S::load_fours_d(|half| place(half, 0));
-        S::sub_d(S::load_fours_d(|half| place(half, 1)), left)
+        let above = S::sub_d(S::load_fours_d(at(0, 1)), S::load_fours_d(at(0, 0)));
+        S::sub_d(S::sub_d(S::load_fours_d(at(1, 1)), S::load_fours_d(at(1, 0))), above)
+    }
+}
+
+/// [`between`], of two channels of four windows.
+///
+/// # Safety
+/// As [`sums_between`].
+#[inline(always)]
+unsafe fn between_pairs<S: Groups>(windows: [Ends; 4]) -> S::D {
+    let at = |row: usize, end: usize| move |window: usize| windows[window][row][end];
+    // SAFETY: as the caller's.
+    unsafe {
+        let above = S::sub_d(S::load_pairs_d(at(0, 1)), S::load_pairs_d(at(0, 0)));
+        S::sub_d(S::sub_d(S::load_pairs_d(at(1, 1)), S::load_pairs_d(at(1, 0))), above)
     }
 }
 
@@ -369,9 +418,9 @@ impl Pixels {
     pub unsafe fn columns<S: Groups>(&self) -> Floats<S> {
         // SAFETY: as the caller's; floats hold columns exactly.
         unsafe {
-            let steps = Floats::<S>::load(STEPS.as_ptr()) * Floats::splat(self.step as f32);
-            let columns = steps + Floats::splat(self.x as f32);
-            Floats(S::min(columns.0, S::splat((self.width - 1) as f32)))
+            let steps = Floats::<S>::load(STEPS.as_ptr()) * Floats::whole(self.step);
+            let columns = steps + Floats::whole(self.x);
+            Floats(S::min(columns.0, Floats::<S>::whole(self.width - 1).0))
         }
     }
 }
@@ -390,6 +439,6 @@ pub(crate) unsafe fn range<S: Groups>(
     unsafe {
         let end = at + radii + Floats::splat(1.0);
         let start = (at - radii).max(Floats::splat(0.0));
-        [start, Floats(S::min(end.0, S::splat(count as f32)))]
+        [start, Floats(S::min(end.0, Floats::<S>::whole(count).0))]
     }
 }
