@@ -209,11 +209,16 @@ impl<const N: usize> Rings<N> {
         self.stride
     }
 
-    /// The fields of the point at a place in row `y`.
+    /// Where in the points the fields of that of row `y` start which is at this place of the row.
     #[inline(always)]
-    pub fn point(&self, place: usize, y: usize) -> Counted {
-        let first = 4 * self.start_near(y) + place;
-        std::array::from_fn(|field| self.points[first + field * self.stride])
+    pub fn place_of_point(&self, place: usize, y: usize) -> usize {
+        4 * self.start_near(y) + place
+    }
+
+    /// A field of the point there.
+    #[inline(always)]
+    pub fn field(&self, point: usize, field: usize) -> f32 {
+        self.points[point + field * self.stride]
     }
 
     /// The points of row `y` and those next to them.

@@ -323,9 +323,11 @@ unsafe fn outermost<S: Groups, const N: usize>(
         let each = rects.each();
         for lane in Bits(missing) {
             let one = each.outermost(rings, line, lane);
-            let [dx, dy, span] =
-                one.map_or([0.0; 3], |([a, b], span)| [b[0] - a[0], b[1] - a[1], span]);
-            (fields[0][lane], fields[1][lane], fields[2][lane]) = (dx, dy, span);
+            for c in 0..2 {
+                let difference = |a: usize, b: usize| rings.field(b, c) - rings.field(a, c);
+                fields[c][lane] = one.map_or(0.0, |([a, b], _)| difference(a, b));
+            }
+            fields[2][lane] = one.map_or(0.0, |(_, span)| span as f32);
         }
         let load = |c: usize| Floats::load(fields[c].as_ptr());
         [load(0), load(1), load(2)]

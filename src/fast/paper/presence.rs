@@ -100,12 +100,14 @@ impl Presence {
     }
 
     /// The first and the last column, between two, of row `y` whose points are there.
+    #[inline(always)]
     pub fn of_row(&self, y: usize, ends: [usize; 2]) -> Option<[usize; 2]> {
         let row = (y & (self.size.rows - 1)) * self.size.words();
         outermost(|word| self.rows[row + word], ends)
     }
 
     /// The first and the last row, between two, of a column whose points are there.
+    #[inline(always)]
     pub fn of_column(&self, x: usize, ends: [usize; 2]) -> Option<[usize; 2]> {
         let Size { columns, .. } = self.size;
         let blocks = self.size.blocks();
@@ -114,21 +116,28 @@ impl Presence {
 }
 
 /// The first and the last bit that is set between two.
+#[inline(always)]
 fn outermost(word: impl Fn(usize) -> u32, [first, last]: [usize; 2]) -> Option<[usize; 2]> {
-    let from_first = |number: usize| {
-        let all = word(number);
-        if number == first / WORD { all & (u32::MAX << (first % WORD)) } else { all }
-    };
-    let up_to_last = |number: usize| {
-        let all = word(number);
-        if number == last / WORD { all & (u32::MAX >> (WORD - 1 - last % WORD)) } else { all }
-    };
-    let mut numbers = first / WORD..=last / WORD;
-    let found = numbers.clone().find(|number| from_first(*number) != 0)?;
-    let start = found * WORD + from_first(found).trailing_zeros() as usize;
-    let found = numbers.rfind(|number| up_to_last(*number) != 0)?;
-    let end = found * WORD + (WORD - 1) - up_to_last(found).leading_zeros() as usize;
-    (start <= last && start <= end).then_some([start, end])
+    let mut start = first;
+    let mut bits = word(start / WORD) >> (start % WORD);
+    while bits == 0 {
+        start = (start / WORD + 1) * WORD;
+        if start > last {
+            return None;
+        }
+        bits = word(start / WORD);
+    }
+    start += bits.trailing_zeros() as usize;
+    if start > last {
+        return None;
+    }
+    let mut end = last;
+    let mut bits = word(end / WORD) << (WORD - 1 - end % WORD);
+    while bits == 0 {
+        end = end / WORD * WORD - 1;
+        bits = word(end / WORD);
+    }
+    Some([start, end - bits.leading_zeros() as usize])
 }
 
 #[cfg(test)]

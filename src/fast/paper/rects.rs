@@ -2,7 +2,7 @@
 
 use std::hint::black_box;
 
-use super::integrals::{Aimed, Counted, MARGIN, Rings};
+use super::integrals::{Aimed, MARGIN, Rings};
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::simd::{GROUP, Groups};
 
@@ -91,7 +91,7 @@ impl<S: Groups> Rects<S> {
         lanes: u32,
         rows: Option<&mut Rows>,
     ) -> Self {
-        let &Pixels { x, step, width } = pixels;
+        let &Pixels { x, width, .. } = pixels;
         // SAFETY: as the caller's; floats hold columns exactly.
         unsafe {
             if let Some(rows) = rows {
@@ -238,27 +238,28 @@ pub(crate) struct Each {
 }
 
 impl Each {
-    /// The outermost points of a window's middle row (`line` 0) or column that are there, and how far apart these are; none if
-    /// there are not two.
+    /// Where the outermost points of a window's middle row (`line` 0) or column are that are there, and how far apart that
+    /// is; none if there are not two.
+    #[inline(always)]
     pub fn outermost<const N: usize>(
         &self,
         rings: &Rings<N>,
         line: usize,
         lane: usize,
-    ) -> Option<([Counted; 2], f32)> {
+    ) -> Option<([usize; 2], usize)> {
         let of_lane = |ends: &[Indices; 2]| [ends[0][lane] as usize, ends[1][lane] as usize];
         let (columns, rows) = (of_lane(&self.columns), of_lane(&self.rows));
         let middle = |[first, last]: [usize; 2]| (first + last) / 2;
-        let ends = if line == 0 {
+        let (ends, [first, last]) = if line == 0 {
             let y = middle(rows);
-            rings.presence.of_row(y, columns)?.map(|x| (x, y))
+            let found = rings.presence.of_row(y, columns)?;
+            (found.map(|x| rings.place_of_point(x, y)), found)
         } else {
             let x = middle(columns);
-            rings.presence.of_column(x, rows)?.map(|y| (x, y))
+            let found = rings.presence.of_column(x, rows)?;
+            (found.map(|y| rings.place_of_point(x, y)), found)
         };
-        let [(left, top), (right, bottom)] = ends;
-        let span = right - left + bottom - top;
-        (span > 0).then(|| (ends.map(|(x, y)| rings.point(x, y)), span as f32))
+        (first < last).then_some((ends, last - first))
     }
 }
 
