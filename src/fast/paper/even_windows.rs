@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::integrals::{Rings, reached, rows_of_rings};
+use super::integrals::{Rings, reached};
 use super::layers::{Layer, with_fraction};
 use super::methods::{CovarianceMatrix, MOMENTS};
 use super::rects::{Pixels, Rects, range};
@@ -122,7 +122,7 @@ impl EvenTile<'_> {
         let origin = [x, y, usual];
         let moments = CovarianceMatrix::about(origin);
         let layer = Layer::of_positions(origin, SPAN * near, reach);
-        rings.start(columns, top, rows_of_rings(reach, height), &layer);
+        rings.start(columns, top, (reach, height), false, &layer);
         let mut next = top;
         for y in self.rows.clone().step_by(BLOCK) {
             let row = middle(y, BLOCK, height);

@@ -44,8 +44,9 @@ pub(crate) struct Rings<const N: usize> {
     columns: Range<usize>,
     /// Elements from a row to the next.
     stride: usize,
-    /// Rows in a ring.
+    /// Rows in the ring of sums, and in that of points.
     rows: usize,
+    rows_of_points: usize,
     aimed: Aimed,
     /// Which points there are, of the rows that were noted.
     pub presence: Presence,
@@ -119,11 +120,21 @@ impl<const N: usize> Rings<N> {
         self.pairs.grow(usize::from(Self::HAS_PAIR) * elements)
     }
 
-    /// Starts over at row `top` of a layer's points, with rings of so many rows; there is room.
-    pub fn start(&mut self, columns: Range<usize>, top: usize, rows: usize, layer: &Layer) {
-        (self.stride, self.columns, self.rows) = (stride(columns.len()), columns, rows);
+    /// Starts over at row `top` of a layer's points, in an image of this height, for windows that reach so far from their
+    /// pixels; there is room. Points are held of all rows of the windows, or, without their `ends`, from the pixels' own on.
+    pub fn start(
+        &mut self,
+        columns: Range<usize>,
+        top: usize,
+        (reach, height): (usize, usize),
+        ends: bool,
+        layer: &Layer,
+    ) {
+        (self.stride, self.columns) = (stride(columns.len()), columns);
+        self.rows = rows_of_rings(reach, height);
+        self.rows_of_points = if ends { self.rows } else { self.rows.min(reach + 3) };
         (self.layer, self.nearest_hidden, self.largest) = (*layer, f32::INFINITY, 0.0);
-        let length = 4 * self.rows * self.stride;
+        let length = 4 * self.rows_of_points * self.stride;
         self.points[..length].fill(0.0);
         self.clear(self.row(top + self.rows - 1));
     }
@@ -180,15 +191,20 @@ impl<const N: usize> Rings<N> {
     /// Row `y`'s plane of a field of the points.
     #[inline(always)]
     fn plane(&self, y: usize, field: usize) -> Range<usize> {
-        let Range { start, end } = self.row(y);
-        let plane = 4 * start + field * (end - start);
-        plane..plane + (end - start)
+        let plane = self.start_of_points(y) + field * self.stride;
+        plane..plane + self.stride
+    }
+
+    /// Where row `y` starts in the ring of points.
+    #[inline(always)]
+    fn start_of_points(&self, y: usize) -> usize {
+        y % self.rows_of_points * 4 * self.stride
     }
 
     /// The first fields of a row's points; the others are a stride apart.
     #[inline(always)]
     fn fields(&self, y: usize) -> *const f32 {
-        self.points[4 * self.start_of(y)..][..4 * self.stride].as_ptr()
+        self.points[self.start_of_points(y)..][..4 * self.stride].as_ptr()
     }
 
     /// The sums of eight channels, of four, and of two.
@@ -209,7 +225,7 @@ impl<const N: usize> Rings<N> {
         self.stride
     }
 
-    /// Where in the points the fields of that of row `y` start which is at this place of the row.
+    /// Where the point's fields start that is at this place of row `y`; all rows of windows are held.
     #[inline(always)]
     pub fn place_of_point(&self, place: usize, y: usize) -> usize {
         4 * self.start_near(y) + place
@@ -226,7 +242,7 @@ impl<const N: usize> Rings<N> {
     pub fn around(&self, y: usize) -> Around {
         Around {
             own: self.fields(y),
-            above: self.fields(y + self.rows - 1),
+            above: self.fields(y + self.rows_of_points - 1),
             below: self.fields(y + 1),
             plane: self.stride,
         }
@@ -288,7 +304,7 @@ impl<const N: usize> Rings<N> {
         whole_points: bool,
     ) {
         let stride = self.stride;
-        let start = 4 * self.start_of(y);
+        let start = self.start_of_points(y);
         let count = self.columns.len();
         assert!(self.columns.start + count.next_multiple_of(LANES) <= depths.len());
         let points = points.row(y, self.columns.clone(), whole_points);
@@ -348,7 +364,7 @@ impl<const N: usize> Rings<N> {
     /// Reads row `y`, of which `depths` are the image's, as points: column, row and inverse depth.
     #[inline(always)]
     pub fn read_positions(&mut self, depths: &[f32], y: usize) {
-        let (start, stride) = (4 * self.start_of(y), self.stride);
+        let (start, stride) = (self.start_of_points(y), self.stride);
         let Range { start: left, end } = self.columns;
         let (xs, rest) = self.points[start..][..4 * stride].split_at_mut(stride);
         let (ys, rest) = rest.split_at_mut(stride);

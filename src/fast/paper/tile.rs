@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::integrals::{Rings, WEIGHT, reached, rows_of_rings};
+use super::integrals::{Rings, WEIGHT, reached};
 use super::layers::{Layer, Waiting, with_fraction};
 use super::methods::Sums;
 use super::rects::{Pixels, Rects, Rows};
@@ -57,7 +57,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let columns = reached(&self.columns, reach, width);
         let Range { start: top, end: bottom } = reached(&self.rows, reach, height);
         let count = columns.len() * (bottom - top);
-        rings.start(columns, top, rows_of_rings(reach, height), layer);
+        rings.start(columns, top, (reach, height), M::ENDS, layer);
         if M::ENDS {
             rings.start_presence();
         }
