@@ -40,9 +40,9 @@ const BOUNDS: [(Semantics, Method, BorderPolicy, u64, u64); 10] = [
     (Pcl, AverageDepthChange, Ignore, 101, 176),
     (Pcl, AverageDepthChange, Mirror, 199, 282),
     (Pcl, Simple3DGradient, Ignore, 104, 184),
-    (Paper, CovarianceMatrix, Ignore, 245, 486),
-    (Paper, Average3DGradient, Ignore, 178, 335),
-    (Paper, AverageDepthChange, Ignore, 204, 334),
+    (Paper, CovarianceMatrix, Ignore, 236, 469),
+    (Paper, Average3DGradient, Ignore, 167, 318),
+    (Paper, AverageDepthChange, Ignore, 176, 312),
 ];
 
 /// In metres: how far the cloud is moved, and the depth of the far plane.

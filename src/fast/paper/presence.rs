@@ -9,7 +9,7 @@ use crate::simd::Simd;
 /// Bits of a word.
 const WORD: usize = u32::BITS as usize;
 
-/// The bits of so many rows. Room for all of a ring is made by its owner.
+/// The bits of the rows of a ring of points.
 #[derive(Debug, Default)]
 pub(crate) struct Presence {
     /// Row by row of a ring, of its columns.
@@ -79,10 +79,10 @@ impl Presence {
         let (words, blocks) = (self.size.words(), self.size.blocks());
         let weights = &weights[..columns];
         let row = &mut self.rows[(y & (rows - 1)) * words..][..words];
-        let block = (y / WORD & (blocks - 1)) * columns;
+        let block = ((y / WORD) & (blocks - 1)) * columns;
         let column = &mut self.columns[block..][..columns];
         let bit = [1 << (y % WORD); LANES];
-        let kept = [if y % WORD == 0 { 0 } else { u32::MAX }; LANES];
+        let kept = [if y.is_multiple_of(WORD) { 0 } else { u32::MAX }; LANES];
         // SAFETY: as the caller's; lanes of floats are taken for words of bits.
         unsafe {
             let [bit, kept] = [bit, kept].map(|word: [u32; LANES]| S::load(word.as_ptr().cast()));
@@ -149,7 +149,8 @@ mod tests {
     #[test]
     fn finds_the_outermost_points() {
         let (columns, height, radius) = (80, 300, 40);
-        let is_there = |x: usize, y: usize| (x * 7 + y * 13 + x * y) % 11 == 0 && x % 29 > 8;
+        let is_there =
+            |x: usize, y: usize| (x * 7 + y * 13 + x * y).is_multiple_of(11) && x % 29 > 8;
         let size = Size::new(columns, 2 * radius + 3);
         let mut presence = Presence::default();
         presence.reserve(size.room()).unwrap();
@@ -162,10 +163,11 @@ mod tests {
             let top = y.saturating_sub(2 * radius);
             for (x, first) in (0..columns).map(|x| (x, x / 2)) {
                 let mut row = (first..=x).filter(|x| is_there(*x, top));
-                let expected = row.next().map(|first| [first, row.last().unwrap_or(first)]);
+                let expected = row.next().map(|first| [first, row.next_back().unwrap_or(first)]);
                 assert_eq!(presence.of_row(top, [first, x]), expected);
                 let mut column = (top..=y).filter(|y| is_there(x, *y));
-                let expected = column.next().map(|first| [first, column.last().unwrap_or(first)]);
+                let expected =
+                    column.next().map(|first| [first, column.next_back().unwrap_or(first)]);
                 assert_eq!(presence.of_column(x, [top, y]), expected);
             }
         }

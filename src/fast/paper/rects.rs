@@ -124,8 +124,8 @@ impl<S: Groups> Rects<S> {
     /// The processor has the instruction set of `S`; the windows are of these rings.
     #[inline(always)]
     pub unsafe fn sums<const N: usize>(&self, rings: &Rings<N>, edge: usize) -> [Doubles<S>; N] {
-        match self {
-            &Rects::Alike { rows: Rows { radius, above, below, .. }, place } => {
+        match *self {
+            Rects::Alike { rows: Rows { radius, above, below, .. }, place } => {
                 let columns = [place + edge - radius - 1, place + radius - edge];
                 let corners = [above, below].map(|row| columns.map(|column| row + column));
                 let of_lane =
@@ -133,7 +133,7 @@ impl<S: Groups> Rects<S> {
                 // SAFETY: as the caller's.
                 unsafe { sums_between::<S, N, true>(rings, of_lane) }
             }
-            &Rects::Each { columns: [left, right], rows: [top, bottom] } => {
+            Rects::Each { columns: [left, right], rows: [top, bottom] } => {
                 // SAFETY: as the caller's.
                 unsafe {
                     let edge = Floats::whole(edge);
@@ -167,8 +167,8 @@ impl<S: Groups> Rects<S> {
         let (points, plane) = (rings.points(), rings.plane_of_points());
         // SAFETY: as the caller's.
         unsafe {
-            match self {
-                &Rects::Alike { rows, place } => {
+            match *self {
+                Rects::Alike { rows, place } => {
                     let (ends, span) = rows.line(place, line);
                     let [from, to] = ends.map(|end| points.wrapping_add(end));
                     let dx = Floats::load(to) - Floats::load(from);
@@ -176,7 +176,7 @@ impl<S: Groups> Rects<S> {
                     let dy = Floats::load(to) - Floats::load(from);
                     [dx, dy, Floats::whole(span)]
                 }
-                &Rects::Each { columns, rows } => {
+                Rects::Each { columns, rows } => {
                     let (columns, rows) = if line == 0 {
                         (columns, [middle(rows); 2])
                     } else {
