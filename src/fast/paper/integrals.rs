@@ -47,7 +47,7 @@ pub(crate) struct Rings<const N: usize> {
     /// Rows in the ring of sums, and in that of points.
     rows: usize,
     rows_of_points: usize,
-    aimed: Aimed,
+    pub aimed: Aimed,
     /// Which points there are, of the rows that were noted.
     pub presence: Presence,
     /// The largest magnitude of a coordinate read so far.
@@ -251,11 +251,6 @@ impl<const N: usize> Rings<N> {
     /// Aims at the windows around the pixels of row `y` in an image of this height.
     pub fn aim(&mut self, y: usize, height: usize) {
         self.aimed = Aimed { y, height, first: y - y % self.rows };
-    }
-
-    #[inline(always)]
-    pub fn aimed(&self) -> Aimed {
-        self.aimed
     }
 
     /// [`Rings::start_of`] without a division, for rows that windows around the row aimed at reach; the one above the first
@@ -582,8 +577,8 @@ impl Around {
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     pub unsafe fn own<S: Groups>(&self, field: usize) -> Floats<S> {
-        // SAFETY: as the caller's; the rows have so many.
-        unsafe { Floats::load(self.own.wrapping_add(field * self.plane)) }
+        // SAFETY: as the caller's.
+        unsafe { self.apart(field, 1) }
     }
 
     /// A field of the points to the left and to the right.
