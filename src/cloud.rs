@@ -323,6 +323,14 @@ pub(crate) struct PointRow<'a> {
 }
 
 impl PointRow<'_> {
+    /// Where lanes start that together are all points: the last ones start before the end of those before them where fewer
+    /// are left, so that none lies behind the row's last point.
+    #[inline(always)]
+    pub fn starts<S: Along>(&self) -> impl Iterator<Item = usize> + use<S> {
+        let count = self.columns.len();
+        (0..count).step_by(S::LANES).map(move |at| at.min(count.saturating_sub(S::LANES)))
+    }
+
     /// x, y and z of as many points as there are lanes, from the `at`-th on; NaN for those behind the last. Asks for
     /// those two rows below, as rows are read downwards.
     ///

@@ -30,9 +30,7 @@ pub(crate) unsafe fn read<S: Along>(
     unsafe {
         let none = S::splat(f32::NAN);
         let (mut nearest, mut deepest) = (S::splat(f32::INFINITY), S::splat(0.0));
-        for x in (0..width).step_by(S::LANES) {
-            // The last ones of a row again, if others would lie behind them.
-            let x = x.min(width.saturating_sub(S::LANES));
+        for x in points.starts::<S>() {
             let [px, py, pz] = points.lanes::<S>(x);
             let there = there::<S>([px, py, pz], options);
             let depth = depth::<S>([px, py, pz], range);

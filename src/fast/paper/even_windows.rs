@@ -298,7 +298,7 @@ impl EvenTile<'_> {
             let noise = unevenness * chance.widen();
             // The pixels' own positions.
             let column = pixels.columns().widen();
-            let [origin_x, origin_y, origin_r, _] = moments.origin.map(|o| Doubles::splat(o));
+            let [origin_x, origin_y, origin_r] = moments.origin.map(|o| Doubles::splat(o));
             let across = column - origin_x - mx;
             let down = Doubles::splat(y as f64) - origin_y - my;
             let inverse_depth = origin_r + mr + slope[0] * across + slope[1] * down;

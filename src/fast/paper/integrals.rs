@@ -136,7 +136,11 @@ impl<const N: usize> Rings<N> {
         (self.layer, self.nearest_hidden, self.largest) = (*layer, f32::INFINITY, 0.0);
         let length = 4 * self.rows_of_points * self.stride;
         self.points[..length].fill(0.0);
-        self.clear(self.row(top + self.rows - 1));
+        let above = self.start_above(top);
+        self.clear(above..above + self.stride);
+        if ends {
+            self.presence.start(Size::new(self.stride, self.rows));
+        }
     }
 
     /// Has sums of nothing.
@@ -153,11 +157,6 @@ impl<const N: usize> Rings<N> {
         }
     }
 
-    /// Starts to note which points are there; there is room.
-    pub fn start_presence(&mut self) {
-        self.presence.start(Size::new(self.stride, self.rows));
-    }
-
     /// Where a column is in a row.
     #[inline(always)]
     pub fn place(&self, x: usize) -> usize {
@@ -172,20 +171,14 @@ impl<const N: usize> Rings<N> {
 
     /// Where row `y` starts in the ring of sums.
     #[inline(always)]
-    pub fn start_of(&self, y: usize) -> usize {
+    fn start_of(&self, y: usize) -> usize {
         y % self.rows * self.stride
     }
 
     /// Where the row above row `y` starts.
     #[inline(always)]
-    pub fn start_above(&self, y: usize) -> usize {
+    fn start_above(&self, y: usize) -> usize {
         self.start_of(y + self.rows - 1)
-    }
-
-    #[inline(always)]
-    fn row(&self, y: usize) -> Range<usize> {
-        let start = self.start_of(y);
-        start..start + self.stride
     }
 
     /// Row `y`'s plane of a field of the points.
@@ -300,8 +293,8 @@ impl<const N: usize> Rings<N> {
     ) {
         let stride = self.stride;
         let start = self.start_of_points(y);
-        let count = self.columns.len();
-        assert!(self.columns.start + count.next_multiple_of(LANES) <= depths.len());
+        let length = self.columns.len().next_multiple_of(LANES);
+        assert!(self.columns.start + length <= depths.len());
         let points = points.row(y, self.columns.clone(), whole_points);
         let to = self.points[start..][..4 * stride].as_mut_ptr();
         // SAFETY: as the caller's; the depths and the row have room for whole pairs of groups.
@@ -309,9 +302,7 @@ impl<const N: usize> Rings<N> {
             let to = to.add(MARGIN);
             let none = S::splat(f32::NAN);
             let mut largest = S::splat(self.largest);
-            for x in (0..count).step_by(S::LANES) {
-                // The last ones of a row again, if others would lie behind them.
-                let x = x.min(count.saturating_sub(S::LANES));
+            for x in points.starts::<S>() {
                 let depths = S::load(depths.as_ptr().add(self.columns.start + x));
                 let deeper = S::lt(S::splat(self.layer.deepest), S::abs(depths));
                 let there = S::and_not(deeper, S::eq(depths, depths));

@@ -66,13 +66,12 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
 
 /// CM: moments about a point of the tile.
 pub(crate) struct CovarianceMatrix {
-    /// x, y, z, 0.
-    pub origin: [f64; 4],
+    pub origin: [f64; 3],
 }
 
 impl CovarianceMatrix {
     pub fn about([x, y, z]: [f32; 3]) -> Self {
-        CovarianceMatrix { origin: [x.into(), y.into(), z.into(), 0.0] }
+        CovarianceMatrix { origin: [x.into(), y.into(), z.into()] }
     }
 }
 

@@ -58,9 +58,6 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let Range { start: top, end: bottom } = reached(&self.rows, reach, height);
         let count = columns.len() * (bottom - top);
         rings.start(columns, top, (reach, height), M::ENDS, layer);
-        if M::ENDS {
-            rings.start_presence();
-        }
         if layer.is_first && layer.hides_some() {
             let [columns, rows] =
                 [&self.columns, &self.rows].map(|all| all.len().div_ceil(self.step));

@@ -96,8 +96,8 @@ impl Sweep {
         self.least.grow(length + 2 * margin)
     }
 
-    /// Fills the map with the windows' radii, whole numbers of pixels, 0 for none. Returns the largest of the own rows.
-    /// There is room for the rows.
+    /// Fills the map's own rows with the windows' radii, whole numbers of pixels, 0 for none. Returns the largest. There is
+    /// room for the rows.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
@@ -225,20 +225,19 @@ impl Sweep {
                     let square = S::mul(distance, distance);
                     S::store(squares.as_mut_ptr().add(margin + x), square);
                 }
+                if !rows.own.contains(&y) {
+                    continue;
+                }
                 // No depth change lies behind the row's end.
                 squares[margin + rows.width..].fill(FAR * FAR);
                 least_of_next::<S>(squares, least);
                 let depths = rows.depths(y).as_ptr();
-                let mut largest_of_row = S::splat(0.0);
                 for x in (0..inside).step_by(LANES) {
                     let depth = S::load(depths.add(x));
                     let columns = [&*squares, &*least].map(|row| row.as_ptr().add(margin + x));
                     let radius = radius::<S>(depth, columns, along, options);
-                    largest_of_row = S::max(radius, largest_of_row);
+                    largest = S::max(radius, largest);
                     S::store(map.add(x), radius);
-                }
-                if rows.own.contains(&y) {
-                    largest = S::max(largest_of_row, largest);
                 }
             }
             let mut lanes = [0.0; LANES];
