@@ -25,6 +25,25 @@ impl Symmetric3 {
     pub fn trace(&self) -> f64 {
         self.xx + self.yy + self.zz
     }
+
+    /// The matrix times a vector.
+    pub fn times(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        let &Symmetric3 { xx, xy, xz, yy, yz, zz } = self;
+        [xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z]
+    }
+
+    /// The matrix that times this one is its determinant.
+    pub fn adjugate(&self) -> Self {
+        let &Symmetric3 { xx, xy, xz, yy, yz, zz } = self;
+        Symmetric3 {
+            xx: yy * zz - yz * yz,
+            xy: xz * yz - xy * zz,
+            xz: xy * yz - xz * yy,
+            yy: xx * zz - xz * xz,
+            yz: xy * xz - xx * yz,
+            zz: xx * yy - xy * xy,
+        }
+    }
 }
 
 /// Points' covariance matrix times their number, about their mean.
@@ -38,21 +57,28 @@ impl Scatter {
     /// In two passes over the points. None without points.
     pub fn of<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> Option<Self> {
         let (mut mean, mut count) = ([0.0; 3], 0.0);
-        for point in points() {
+        points().for_each(|point| {
             for i in 0..3 {
                 mean[i] += point[i];
             }
             count += 1.0;
-        }
+        });
         if count == 0.0 {
             return None;
         }
         mean = mean.map(|sum| sum / count);
         let mut matrix = Symmetric3::default();
-        for point in points() {
+        points().for_each(|point| {
             matrix.add_outer([point[0] - mean[0], point[1] - mean[1], point[2] - mean[2]]);
-        }
+        });
         Some(Scatter { matrix, mean, count })
+    }
+
+    /// The covariance matrix.
+    pub fn covariance(&self) -> Symmetric3 {
+        let Symmetric3 { xx, xy, xz, yy, yz, zz } = self.matrix;
+        let [xx, xy, xz, yy, yz, zz] = [xx, xy, xz, yy, yz, zz].map(|sum| sum / self.count);
+        Symmetric3 { xx, xy, xz, yy, yz, zz }
     }
 
     /// The eigenvalues of the covariance matrix, ascending.

@@ -14,7 +14,7 @@ use crate::methods::{Estimate, estimate, estimate_window, start};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
 use crate::paper::{
-    self, Asked, Blocks, Cloud, EvenWindow, EvenWindows, NO_WINDOW, PaperMaps, SecondPass,
+    self, Asked, Blocks, Cloud, EvenWindows, NO_WINDOW, PaperMaps, SecondPass, Windows,
     with_missing_as_nan,
 };
 use crate::smoothing_area::window_side;
@@ -337,6 +337,15 @@ fn packed(points: &[[f32; 3]], width: usize, height: usize) -> Points<'_> {
         .expect("a packed copy of a valid cloud")
 }
 
+/// A view of `width` x `height` estimates.
+fn normals_of(
+    estimates: &mut Vec<[f32; 4]>,
+    (width, height): (usize, usize),
+) -> Result<Normals<'_>, Error> {
+    resize(estimates, width * height, Estimate::NONE.into())?;
+    Normals::interleaved(estimates.as_flattened_mut(), width, height, 4, 0, Some(3))
+}
+
 /// The windows and estimates that the one-sided and crease windows build on.
 struct Engine<'a> {
     points: &'a Points<'a>,
@@ -350,13 +359,11 @@ impl Engine<'_> {
     /// The `width` x `height` estimates that `compute` writes.
     fn written(
         &mut self,
-        (width, height): (usize, usize),
+        size: (usize, usize),
         estimates: &mut Vec<[f32; 4]>,
         compute: impl FnOnce(Isa, &Points, &Options, &Normals, &mut Scratch) -> Result<(), Error>,
     ) -> Result<(), Error> {
-        resize(estimates, width * height, Estimate::NONE.into())?;
-        let estimates = estimates.as_flattened_mut();
-        let normals = Normals::interleaved(estimates, width, height, 4, 0, Some(3))?;
+        let normals = normals_of(estimates, size)?;
         compute(self.isa, self.points, self.options, &normals, self.scratch)
     }
 
@@ -389,11 +396,8 @@ impl paper::Engine for Engine<'_> {
         self.scratch.workers()
     }
 
-    fn windows(
-        &mut self,
-        sizes: &mut Vec<u32>,
-        estimates: &mut Vec<[f32; 4]>,
-    ) -> Result<(), Error> {
+    fn windows(&mut self, found: &mut Windows) -> Result<(), Error> {
+        let Windows { sizes, estimates, .. } = found;
         let size @ (width, height) = (self.points.width(), self.points.height());
         let pixels = (0..width * height).map(|at| (at % width, at / width));
         if self.options.semantics == Semantics::Pcl {
@@ -418,17 +422,36 @@ impl paper::Engine for Engine<'_> {
         })
     }
 
-    fn even_windows(
+    fn windows_and_even(
         &mut self,
         cloud: &Cloud,
         asked: &Asked,
-        needed: &[bool],
-        windows: &mut Vec<EvenWindow>,
+        found: &mut Windows,
     ) -> Result<(), Error> {
         if self.is_plain {
-            return refill(windows, paper::even_windows(cloud, asked, needed));
+            self.windows(found)?;
+            let Windows { even, of_even, .. } = found;
+            refill(even, paper::even_windows(cloud, asked))?;
+            let pixels = (0..even.len()).map(|block| asked.blocks.middle(block));
+            let radius = |(x, y)| even[asked.blocks.block(y * cloud.width + x)].radius as u32;
+            return self.plain(pixels, of_even, |pixel| self.of_radius(pixel, radius(pixel)));
         }
-        fast::paper::even_windows(self.isa, cloud, asked, needed, windows, self.scratch)
+        // CM's sums are what even windows are made from.
+        let has_normals = self.options.method == Method::CovarianceMatrix;
+        let has_pixels = has_normals && self.options.semantics == Semantics::Paper;
+        if !has_pixels {
+            self.windows(found)?;
+        }
+        let Windows { sizes, estimates, even, of_even } = found;
+        let of_pixels = normals_of(estimates, (cloud.width, cloud.height))?;
+        let of_blocks = normals_of(of_even, (asked.blocks.across, asked.blocks.down))?;
+        let along = fast::paper::Along {
+            pixels: &of_pixels,
+            radii: has_pixels.then_some(sizes),
+            blocks: has_normals.then_some(&of_blocks),
+        };
+        let Engine { points, options, isa, ref mut scratch, .. } = *self;
+        fast::paper::even_windows(isa, points, options, (cloud, asked), even, along, scratch)
     }
 
     fn choices(&mut self, even: &EvenWindows, choices: &mut Vec<u32>) -> Result<(), Error> {

@@ -110,6 +110,12 @@ impl<S: Simd> Doubles<S> {
     }
 
     #[inline(always)]
+    pub fn sqrt(self) -> Self {
+        // SAFETY: there is a group, so there is the instruction set.
+        Doubles(unsafe { S::sqrt_d(self.0) })
+    }
+
+    #[inline(always)]
     pub fn max(self, other: Self) -> Self {
         // SAFETY: there is a group, so there is the instruction set.
         Doubles(unsafe { S::max_d(self.0, other.0) })

@@ -6,7 +6,7 @@
 //! Blocks are seldom on more than two surfaces, so two of a block's pixels choose for all: the middle one, and the one
 //! to which the window of the middle one is worth least.
 
-use super::blocks::{BLOCK, MIDDLE};
+use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::cloud::Cloud;
 use super::even_windows::{Asked, EvenWindow};
 use super::planes::{JITTER, inverse_depth};
@@ -36,19 +36,34 @@ impl EvenWindow {
     /// Whether its depths are without noise. Those that a sensor rounds look so where all are alike, so only a window
     /// in which they change tells.
     fn is_exact(&self, least_noise: f32) -> bool {
-        let [across, down] = self.slope;
-        self.noise < least_noise && across * across + down * down > least_noise
+        self.noise < least_noise && self.steepness * self.steepness > least_noise
     }
 }
 
 /// The choice of a pixel that takes no window.
 pub(crate) const NO_WINDOW: u32 = u32::MAX;
 
-/// The even windows that are needed, to choose from.
+/// The columns or rows of blocks, of so many, at the places of windows of a radius: before block `at`, its own, behind.
+fn places(at: usize, radius: usize, count: usize) -> [usize; 3] {
+    let distance = radius.div_ceil(BLOCK);
+    [at.saturating_sub(distance), at, (at + distance).min(count - 1)]
+}
+
+/// Those of the places around a block, 0 before it, 1 its own, 2 behind it. Of windows that are worth the same, the one
+/// at the middle of an edge is nearer.
+pub(crate) const PLACES: [(usize, usize); 8] =
+    [(0, 1), (2, 1), (1, 0), (1, 2), (0, 0), (2, 0), (0, 2), (2, 2)];
+
+/// The even windows, to choose from.
 pub(crate) struct EvenWindows<'a> {
     pub cloud: &'a Cloud,
     pub asked: &'a Asked<'a>,
     pub options: &'a Options,
+    /// The pixels that take one.
+    pub concerned: &'a [bool],
+    /// From how many radii the windows come that a block's pixels can take, starting with the largest and halving it,
+    /// block by block; 0 for a block that takes none.
+    pub levels: &'a [u8],
     /// Block by block.
     pub windows: &'a [EvenWindow],
 }
@@ -59,9 +74,26 @@ impl EvenWindows<'_> {
         self.windows[block].radius as u32
     }
 
+    /// Calls `visit` with the blocks whose windows a block's pixels can take: itself, and those one radius away along
+    /// the rows, the columns and both.
+    fn for_each_place(&self, block: usize, mut visit: impl FnMut(usize)) {
+        let Blocks { across, down, .. } = self.asked.blocks;
+        let (x, y) = (block % across, block / across);
+        visit(block);
+        let (largest, levels) = (self.asked.largest(block), u32::from(self.levels[block]));
+        let radii = (0..levels).map(|level| largest >> level);
+        for radius in radii.take_while(|radius| *radius > 0) {
+            let columns = places(x, radius as usize, across);
+            let rows = places(y, radius as usize, down).map(|row| row * across);
+            for (column, row) in PLACES {
+                visit(rows[row] + columns[column]);
+            }
+        }
+    }
+
     /// The block whose window each pixel takes, or [`NO_WINDOW`]: the plain form.
     pub fn choose(&self, choices: &mut [u32]) {
-        let levels = self.asked.levels.iter().enumerate();
+        let levels = self.levels.iter().enumerate();
         for (block, _) in levels.filter(|(_, level)| **level > 0) {
             Candidates::of(self, block).choose(choices);
         }
@@ -94,13 +126,13 @@ impl<'a> Candidates<'a> {
         let (windows, noise) = (Vec::new(), f32::INFINITY);
         let mut found = Candidates { even, middle, windows, noise, is_exact: false };
         let mut exact = 0.0;
-        asked.for_each_place(block, |place| {
+        even.for_each_place(block, |place| {
             let window = even.windows[place];
             let middle = found.way(blocks.middle(place));
             if window.radius > 0.0 && length(middle) <= window.radius + REACH {
                 found.noise = window.noise.min(found.noise);
                 exact += f32::from(window.is_exact(asked.least_noise));
-                found.windows.push(Candidate::new(place, window, middle));
+                found.windows.push(Candidate { place, window, middle, cost: f32::INFINITY });
             }
         });
         found.noise = found.noise.max(asked.least_noise);
@@ -119,13 +151,13 @@ impl<'a> Candidates<'a> {
 
     /// Writes what the block's pixels take.
     fn choose(&self, choices: &mut [u32]) {
-        let EvenWindows { cloud, asked, .. } = self.even;
+        let EvenWindows { cloud, concerned, .. } = self.even;
         let [x, y] = self.middle.map(|middle| middle - MIDDLE);
         let ends = [(x, cloud.width), (y, cloud.height)].map(|(at, end)| (at + BLOCK).min(end));
         let inside = Rect { x: x..ends[0], y: y..ends[1] };
         let takes_some = |&(x, y): &(usize, usize)| {
             let at = cloud.index(x, y);
-            asked.concerned[at] && !cloud.is_missing(at)
+            concerned[at] && !cloud.is_missing(at)
         };
         let pixels: Vec<Pixel> =
             inside.pixels().filter(takes_some).map(|pixel| self.pixel(pixel)).collect();
@@ -197,28 +229,32 @@ impl<'a> Candidates<'a> {
     /// What a window costs a pixel; infinite for none. One that ends short of the pixel can be taken if its point, or
     /// in inverse depth one within the tolerance of it, lies in the window's plane.
     fn cost(&self, window: Option<&Candidate>, pixel: &Pixel) -> f32 {
-        let Some(Candidate { window, middle: [dx, dy], plane, cost: even, jitter, .. }) = window
-        else {
+        let Some(Candidate { window, middle: [dx, dy], cost: even, .. }) = window else {
             return f32::INFINITY;
         };
         let [x, y] = pixel.way;
-        let astray = pixel.near.inverse_depth - plane.at(pixel.near.way);
+        let astray = pixel.near.inverse_depth - inverse_depth_along(window.q, pixel.near.ray);
         let astray = (astray * astray - NEAR_NOISE * self.noise / pixel.near.points).max(0.0);
         let short = (length([x - dx, y - dy]) - window.radius).max(0.0);
         let cost = (even + astray * (NEAR * window.per_bend)) * (1.0 + short * short);
-        let lies_in = || (pixel.inverse_depth - plane.at([x, y])).abs() < pixel.tolerance + jitter;
+        let lies_in = || {
+            let off = (pixel.inverse_depth - inverse_depth_along(window.q, pixel.ray)).abs();
+            off < pixel.tolerance + JITTER * window.steepness
+        };
         if short == 0.0 || lies_in() { cost } else { f32::INFINITY }
     }
 
     /// Whether there is a crease between a window and another, and the pixel on the window's side of it: there the
     /// same plane is in front as in the middle of this window, and behind in that of the other.
     fn is_side_of(&self, window: &Candidate, other: &Candidate, pixel: &Pixel) -> bool {
-        let gap = window.plane.minus(&other.plane);
-        let (here, there) = (gap.at(window.middle), gap.at(other.middle));
+        let (window, other) = (&window.window, &other.window);
+        let gap = std::array::from_fn(|i| window.q[i] - other.q[i]);
+        let [here, there, at_pixel] =
+            [window.ray, other.ray, pixel.ray].map(|ray| inverse_depth_along(gap, ray));
         let least_gap = here.abs().min(there.abs());
         least_gap * least_gap > CREASE_NOISE * self.noise
             && here * there < 0.0
-            && here * gap.at(pixel.way) > 0.0
+            && here * at_pixel > 0.0
     }
 
     fn pixel(&self, (x, y): (usize, usize)) -> Pixel {
@@ -226,6 +262,7 @@ impl<'a> Candidates<'a> {
         Pixel {
             at,
             way: self.way((x, y)),
+            ray: self.even.cloud.ray(at),
             inverse_depth: inverse_depth(self.even.cloud.depths[at]),
             tolerance: self.even.tolerance(at),
             near: self.near((x, y)),
@@ -238,21 +275,27 @@ impl<'a> Candidates<'a> {
         let EvenWindows { cloud, asked, .. } = self.even;
         let is_clean = asked.clean[cloud.index(x, y)] > 0;
         let reach = usize::from(is_clean && !self.is_exact);
-        let (mut sums, mut points) = ([0.0; 3], 0.0);
-        for (column, row) in Rect::around((x, y), reach, (cloud.width, cloud.height)).pixels() {
-            let inverse = inverse_depth(cloud.depths[cloud.index(column, row)]);
-            if !inverse.is_nan() {
-                let offset = [column as f32 - x as f32, row as f32 - y as f32];
-                for (sum, value) in sums.iter_mut().zip([inverse, offset[0], offset[1]]) {
-                    *sum += value;
+        let rect = Rect::around((x, y), reach, (cloud.width, cloud.height));
+        // Column by column.
+        let mut sums = [0.0; 5];
+        for x in rect.x {
+            let mut of_column = [0.0; 5];
+            for at in rect.y.clone().map(|y| cloud.index(x, y)) {
+                let inverse = inverse_depth(cloud.depths[at]);
+                if !inverse.is_nan() {
+                    let [x, y, z] = cloud.ray(at);
+                    add(&mut of_column, [inverse, x, y, z, 1.0]);
                 }
-                points += 1.0;
             }
+            add(&mut sums, of_column);
         }
-        let [inverse_depth, dx, dy] = sums.map(|sum| sum / points);
-        let [x, y] = self.way((x, y));
-        Near { inverse_depth, way: [x + dx, y + dy], points }
+        let [inverse_depth, x, y, z] = [0, 1, 2, 3].map(|i| sums[i] / sums[4]);
+        Near { inverse_depth, ray: [x, y, z], points: sums[4] }
     }
+}
+
+fn add(sums: &mut [f32; 5], values: [f32; 5]) {
+    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
 }
 
 /// How far a way leads along the rows or the columns, whichever is more.
@@ -260,27 +303,20 @@ fn length([dx, dy]: [f32; 2]) -> f32 {
     dx.abs().max(dy.abs())
 }
 
-/// A window that a block's pixels can take. Places are in pixels from the block's middle.
+/// The inverse depth along a ray of the plane q P = 1, or how far a plane's is above another's, of which q is the difference.
+fn inverse_depth_along(q: [f32; 3], ray: [f32; 3]) -> f32 {
+    q[0] * ray[0] + q[1] * ray[1] + q[2] * ray[2]
+}
+
+/// A window that a block's pixels can take.
 struct Candidate {
     /// Its own block.
     place: usize,
     window: EvenWindow,
+    /// In pixels from the block's middle.
     middle: [f32; 2],
-    plane: Inclined,
-    /// How far the sensor's noise along rows and columns moves points off the plane.
-    jitter: f32,
     /// What it costs any pixel.
     cost: f32,
-}
-
-impl Candidate {
-    fn new(place: usize, window: EvenWindow, middle: [f32; 2]) -> Self {
-        let [across, down] = window.slope;
-        let at_middle = window.inverse_depth - across * middle[0] - down * middle[1];
-        let plane = Inclined { at_middle, slope: window.slope };
-        let jitter = JITTER * (across * across + down * down).sqrt();
-        Candidate { place, window, middle, plane, jitter, cost: f32::INFINITY }
-    }
 }
 
 /// A pixel that takes a window.
@@ -288,32 +324,15 @@ struct Pixel {
     at: usize,
     /// Where it is from the block's middle.
     way: [f32; 2],
+    ray: [f32; 3],
     inverse_depth: f32,
     tolerance: f32,
     near: Near,
 }
 
-/// A plane by its inverse depth at the middle pixel of a block, and its change per pixel to the right and down.
-struct Inclined {
-    at_middle: f32,
-    slope: [f32; 2],
-}
-
-impl Inclined {
-    fn at(&self, [x, y]: [f32; 2]) -> f32 {
-        self.at_middle + self.slope[0] * x + self.slope[1] * y
-    }
-
-    /// How far its inverse depths are above another's.
-    fn minus(&self, other: &Inclined) -> Inclined {
-        let slope = std::array::from_fn(|i| self.slope[i] - other.slope[i]);
-        Inclined { at_middle: self.at_middle - other.at_middle, slope }
-    }
-}
-
-/// The mean inverse depth of points next to a pixel, the mean of their places from the block's middle, and their number.
+/// The means of points next to a pixel, and their number.
 struct Near {
     inverse_depth: f32,
-    way: [f32; 2],
+    ray: [f32; 3],
     points: f32,
 }

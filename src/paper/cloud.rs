@@ -1,5 +1,6 @@
 //! The organized cloud with its depths; every way of being missing has become NaN.
 
+use super::planes::inverse_depth;
 use super::rect::Rect;
 use crate::Error;
 use crate::cloud::Points;
@@ -12,6 +13,8 @@ use crate::options::{Depth, Options, Semantics};
 pub(crate) struct Cloud {
     pub width: usize,
     pub height: usize,
+    /// Whether depths are distances from the origin, not z.
+    pub has_range: bool,
     pub points: Vec<[f32; 3]>,
     pub depths: Vec<f32>,
 }
@@ -25,10 +28,9 @@ impl Cloud {
 
     /// Becomes another cloud.
     pub fn read(&mut self, points: &Points, options: &Options) -> Result<(), Error> {
-        self.resize(points)?;
-        let width = self.width;
+        self.resize(points, options)?;
+        let (width, range) = (self.width, self.has_range);
         let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
-        let range = Self::has_range(options);
         let depth = |[x, y, z]: [f32; 3]| if range { (x * x + y * y + z * z).sqrt() } else { z };
         let rows = self.points.chunks_mut(width).zip(self.depths.chunks_mut(width)).enumerate();
         for (y, (points, depths)) in rows {
@@ -41,15 +43,12 @@ impl Cloud {
     }
 
     /// Takes the size of a cloud.
-    pub fn resize(&mut self, points: &Points) -> Result<(), Error> {
+    pub fn resize(&mut self, points: &Points, options: &Options) -> Result<(), Error> {
         (self.width, self.height) = (points.width(), points.height());
+        let is_paper = options.semantics == Semantics::Paper;
+        self.has_range = is_paper && options.paper.depth == Depth::Range;
         resize(&mut self.points, self.width * self.height, [f32::NAN; 3])?;
         resize(&mut self.depths, self.width * self.height, f32::NAN)
-    }
-
-    /// Whether depths are distances from the origin, not z.
-    pub fn has_range(options: &Options) -> bool {
-        options.semantics == Semantics::Paper && options.paper.depth == Depth::Range
     }
 
     /// Bytes held.
@@ -63,6 +62,13 @@ impl Cloud {
 
     pub fn is_missing(&self, at: usize) -> bool {
         self.depths[at].is_nan()
+    }
+
+    /// A pixel's point over its depth.
+    pub fn ray(&self, at: usize) -> [f32; 3] {
+        let inverse = inverse_depth(self.depths[at]);
+        let [x, y, z] = self.points[at].map(|coordinate| coordinate * inverse);
+        [x, y, if self.has_range { z } else { 1.0 }]
     }
 
     /// How many pixels before this one in its row, axis 0, or in its column the last finite one is.
@@ -88,6 +94,12 @@ pub(crate) trait CleanPoints {
 impl CleanPoints for Cloud {
     fn at(&self, x: usize, y: usize) -> [f32; 3] {
         self.points[self.index(x, y)]
+    }
+
+    fn finite(&self, rect: &Rect) -> impl Iterator<Item = [f64; 3]> {
+        let Rect { x: columns, y: rows } = rect.clone();
+        let rows = rows.map(move |y| &self.points[y * self.width..][columns.clone()]);
+        rows.flatten().filter(|point| !point[2].is_nan()).map(|point| point.map(f64::from))
     }
 }
 

@@ -21,16 +21,15 @@ impl SummedNormals {
         workers: &Workers,
     ) -> Result<(), Error> {
         self.sums.sum_up(blocks.across, blocks.down, workers, |place| {
-            let mut sum = [0.0; 4];
+            let mut sum = [0.0f32; 4];
             for at in blocks.pixels(place) {
-                let [x, y, z, _] = estimates[at].map(f64::from);
-                if !x.is_nan() {
-                    for (sum, value) in sum.iter_mut().zip([x, y, z, 1.0]) {
-                        *sum += value;
-                    }
+                let [x, y, z, _] = estimates[at];
+                let there = if x.is_nan() { [0.0; 4] } else { [x, y, z, 1.0] };
+                for i in 0..4 {
+                    sum[i] += there[i];
                 }
             }
-            sum
+            sum.map(f64::from)
         })
     }
 

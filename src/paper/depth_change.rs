@@ -88,8 +88,11 @@ impl DepthChanges {
         /// How far the surface is looked at along and across a change, in pixels.
         const ALONG: usize = 5;
         const ACROSS: usize = 2;
+        /// The least share of a change that a surface changes within `ALONG` pixels which explains it.
+        const FLAT: f32 = 0.4;
         let &Cloud { width, height, .. } = cloud;
-        let inverse = |at: usize| f64::from(inverse_depth(cloud.depths[at]));
+        let inverse = |at: usize| inverse_depth(cloud.depths[at]);
+        let ray = |at: usize| cloud.ray(at).map(f64::from);
         // `at` is the last pixel before the change.
         let is_explained = |axis: usize, at: usize| {
             let pixel = [at % width, at / width];
@@ -98,18 +101,24 @@ impl DepthChanges {
             let [step, length, lines] = [[1, width, height], [width, height, width]][axis];
             let next = at + step;
             let Some(gap) = cloud.gap(next, axis) else { return false };
-            let jump = (inverse(next) - inverse(next - gap * step)).abs();
+            let last = next - gap * step;
+            let jump = (inverse(next) - inverse(last)).abs();
             let rect = |along: Range<usize>| {
                 let across = j.saturating_sub(ACROSS)..(j + ACROSS + 1).min(lines);
                 let (x, y) = if axis == 0 { (along, across) } else { (across, along) };
                 Rect { x, y }
             };
-            let (last, first) = (i + 1 - gap, i + 1);
-            let before = rect((last + 1).saturating_sub(ALONG)..last + 1);
-            let after = rect(first..(first + ALONG).min(length));
+            let (before, after) = (i + 2 - gap, i + 1);
+            let before = rect(before.saturating_sub(ALONG)..before);
+            let after = rect(after..(after + ALONG).min(length));
             let is_steep = |rect: Rect| {
-                let slope = Plane::of(cloud, &rect)?.slope[axis].abs();
-                Some(jump <= f64::from(JITTER) * slope * gap as f64)
+                // Cheaper to see, and true of most edges: it is too flat.
+                if inverse_range(cloud, &rect) < FLAT * jump {
+                    return Some(false);
+                }
+                let plane = Plane::of(cloud, &rect)?;
+                let change = plane.at(ray(next)) - plane.at(ray(last));
+                Some(f64::from(jump) <= f64::from(JITTER) * change.abs())
             };
             let mut sides = [before, after].into_iter().filter_map(is_steep);
             sides.next() == Some(true) && sides.all(|is_steep| is_steep)
@@ -141,6 +150,17 @@ impl DepthChanges {
         least_steps(clean_radii, spoilt, (width, height), LARGEST_CLEAN, 1, 1)?;
         Ok(clean_radii)
     }
+}
+
+/// How far apart the inverse depths of a rectangle's points are.
+fn inverse_range(cloud: &Cloud, rect: &Rect) -> f32 {
+    let rows = rect.y.clone().map(|y| &cloud.depths[y * cloud.width..][rect.x.clone()]);
+    let (mut least, mut largest) = (f32::INFINITY, f32::NEG_INFINITY);
+    for depth in rows.flatten() {
+        least = depth.min(least);
+        largest = depth.max(largest);
+    }
+    (inverse_depth(least) - inverse_depth(largest)).abs()
 }
 
 /// Calls `visit` with the columns of a row's changes, and these. They are few: most of the row is looked at by sixteens.

@@ -4,14 +4,10 @@
 //! A pixel beside a depth change or a crease is in the middle of no large window that lies on one surface, but it is
 //! at the edge or in the corner of some, which are the even windows of blocks nearby.
 
-use std::iter::repeat_n;
-
-use super::blocks::{BLOCK, Blocks};
+use super::blocks::Blocks;
 use super::cloud::Cloud;
 use super::planes::Plane;
 use super::rect::Rect;
-use crate::Error;
-use crate::memory::refill;
 
 /// Inverse depths that deviate less than this many alpha from a plane are as good as in it.
 const EVEN: f32 = 0.02;
@@ -29,13 +25,15 @@ pub(crate) const JAGGED_POINTS: f64 = 0.8;
 
 /// A block's even window, and what it is worth.
 #[derive(Clone, Copy, Debug, Default)]
-#[repr(C)] // Eight floats, which the fast form reads as such.
+#[repr(C)] // Twelve floats, which the fast form reads as such.
 pub(crate) struct EvenWindow {
     /// A whole number; 0 for no window.
     pub radius: f32,
-    /// The plane's inverse depth at the window's pixel, and its change per pixel to the right and down.
-    pub inverse_depth: f32,
-    pub slope: [f32; 2],
+    /// The plane q P = 1, and the ray of the window's mean point.
+    pub q: [f32; 3],
+    pub ray: [f32; 3],
+    /// How much the plane's inverse depth changes from pixel to pixel.
+    pub steepness: f32,
     /// The mean square deviation from the plane, and the variance that it may be of.
     pub unevenness: f32,
     pub noise: f32,
@@ -47,13 +45,8 @@ pub(crate) struct EvenWindow {
 /// What windows are asked for.
 pub(crate) struct Asked<'a> {
     pub blocks: Blocks,
-    /// The pixels that take one.
-    pub concerned: &'a [bool],
     /// The radius that the depth asks for, block by block, at most `limit`; 0 where all points are missing.
     pub wanted: &'a [u32],
-    /// From how many radii the windows come that a block's pixels can take, starting with the largest and halving it,
-    /// block by block; 0 for a block that takes none.
-    pub levels: &'a [u8],
     /// The largest radius of a window without a depth change, pixel by pixel.
     pub clean: &'a [i16],
     /// The largest radius of all.
@@ -69,63 +62,18 @@ impl Asked<'_> {
         (2 * self.wanted[block]).min(self.limit)
     }
 
-    /// The radii of the windows around the block that its pixels can take.
-    fn radii(&self, block: usize) -> impl Iterator<Item = u32> + use<> {
-        let (largest, levels) = (self.largest(block), u32::from(self.levels[block]));
-        (0..levels).map(move |level| largest >> level).take_while(|radius| *radius > 0)
-    }
-
-    /// Calls `visit` with the blocks whose windows a block's pixels can take: itself, and those one radius away along
-    /// the rows, the columns and both.
-    pub fn for_each_place(&self, block: usize, mut visit: impl FnMut(usize)) {
-        let Blocks { across, down, .. } = self.blocks;
-        let (x, y) = (block % across, block / across);
-        visit(block);
-        for radius in self.radii(block) {
-            let columns = places(x, radius as usize, across);
-            let rows = places(y, radius as usize, down).map(|row| row * across);
-            for (column, row) in PLACES {
-                visit(rows[row] + columns[column]);
-            }
-        }
-    }
-
-    /// Notes whether some pixel can take a block's window, block by block.
-    pub fn needed(&self, needed: &mut Vec<bool>) -> Result<(), Error> {
-        refill(needed, repeat_n(false, self.blocks.count()))?;
-        for block in (0..needed.len()).filter(|block| self.levels[*block] > 0) {
-            self.for_each_place(block, |place| needed[place] = true);
-        }
-        Ok(())
-    }
-
     /// The variance told from none where the sensor's smallest depth change is `alpha`.
     pub fn least_noise(alpha: f32) -> f32 {
         (EVEN * alpha).powi(2)
     }
 }
 
-/// The columns or rows of blocks, of so many, at the places of windows of a radius: before block `at`, its own, behind.
-fn places(at: usize, radius: usize, count: usize) -> [usize; 3] {
-    let distance = radius.div_ceil(BLOCK);
-    [at.saturating_sub(distance), at, (at + distance).min(count - 1)]
-}
-
-/// Those of the places around a block, 0 before it, 1 its own, 2 behind it. Of windows that are worth the same, the one
-/// at the middle of an edge is nearer.
-pub(crate) const PLACES: [(usize, usize); 8] =
-    [(0, 1), (2, 1), (1, 0), (1, 2), (0, 0), (2, 0), (0, 2), (2, 2)];
-
-/// The even windows of the needed blocks: the plain form.
+/// The even windows of all blocks: the plain form.
 pub(crate) fn even_windows<'a>(
     cloud: &'a Cloud,
     asked: &'a Asked,
-    needed: &'a [bool],
 ) -> impl ExactSizeIterator<Item = EvenWindow> + 'a {
-    let window = move |(block, needed): (_, &bool)| {
-        needed.then(|| even_window(cloud, asked, block)).flatten().unwrap_or_default()
-    };
-    needed.iter().enumerate().map(window)
+    (0..asked.blocks.count()).map(|block| even_window(cloud, asked, block).unwrap_or_default())
 }
 
 /// That of one block: the plain form.
@@ -137,7 +85,7 @@ pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<
     let plane = |radius: u32| Plane::of(cloud, &rect(radius));
     let jagged = |radius: u32| {
         let plane = plane(radius)?;
-        let steep = JAGGED * JAGGED * plane.steepness_squared();
+        let steep = JAGGED * JAGGED * plane.steepness_squared;
         let is_jagged = plane.unevenness <= steep
             && f64::from(asked.least_noise) <= steep
             && plane.points >= JAGGED_POINTS * rect(radius).area() as f64;
@@ -154,16 +102,16 @@ pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<
         let mut found = plane(radius)?;
         while radius > 1
             && let Some(half) = plane(radius / 2)
-            && found.unevenness > noise(&half).max(f64::from(asked.least_noise))
+            && found.unevenness >= noise(&half).max(f64::from(asked.least_noise))
         {
             (radius, found) = (radius / 2, half);
         }
         Some((radius, found))
     })?;
-    let [x, y] = [pixel.0, pixel.1].map(|at| at as f64);
     Some(EvenWindow {
-        inverse_depth: plane.at([x, y]) as f32,
-        slope: plane.slope.map(|slope| slope as f32),
+        q: plane.q.map(|q| q as f32),
+        ray: plane.ray.map(|ray| ray as f32),
+        steepness: plane.steepness_squared.sqrt() as f32,
         unevenness: plane.unevenness as f32,
         noise: noise(&plane) as f32,
         ..EvenWindow::worth(radius, plane.points as f32)

@@ -22,17 +22,16 @@ mod surroundings;
 pub(crate) use blocks::{BLOCK, Blocks, MIDDLE, middle};
 pub(crate) use choices::{
     ALIKE, CREASE_COST, CREASE_NOISE, EXACT_SHARE, EvenWindows, MISFIT, NEAR, NEAR_NOISE,
-    NO_WINDOW, REACH,
+    NO_WINDOW, PLACES, REACH,
 };
 pub(crate) use cloud::{CleanPoints, Cleaned, Cloud};
 pub(crate) use even_windows::{
-    Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, PLACES, even_window,
-    even_windows,
+    Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, even_window, even_windows,
 };
 pub(crate) use methods::estimate as plain_estimate;
 pub(crate) use planes::{JITTER, Plane, inverse_depth};
 pub(crate) use rect::Rect;
-pub(crate) use second_pass::{Engine, SecondPass};
+pub(crate) use second_pass::{Engine, SecondPass, Windows};
 pub(crate) use smoothing_area::window;
 pub(crate) use summed_area::{ROUNDING, SummedArea};
 

@@ -1,65 +1,89 @@
 //! Planes through the points of a rectangle.
 //!
-//! A plane's inverse depth is a linear function of the position in the image, whatever the camera's focal length,
-//! and in inverse depth the sensor's smallest depth change is alpha everywhere (Eq. 4).
+//! The plane q P = 1 has, where a ray is a point over its depth, the inverse depth q ray: a linear function of the ray,
+//! whatever the camera is. In inverse depth the sensor's smallest depth change is alpha everywhere (Eq. 4), so that is what
+//! deviations are measured in. The sum of (1 - q P)^2, which the plane makes least, weighs them by the depths' squares,
+//! which are much the same in a window; and it is made from the moments that CM sums up (Eq. 16-25).
 
-use super::cloud::Cloud;
+use super::cloud::{CleanPoints, Cloud};
 use super::rect::Rect;
 use crate::eigen::{Scatter, Symmetric3};
 
 /// The sensor's noise along rows and columns, in pixels: it moves points off steep planes by that many times the slope.
 pub(crate) const JITTER: f32 = 4.0;
 
-/// The linear function of the position that fits the inverse depths in a rectangle best.
+/// The plane that fits the points in a rectangle best.
 #[derive(Clone, Copy)]
 pub(crate) struct Plane {
-    center: [f64; 2],
-    offset: f64,
-    /// Per pixel to the right and down.
-    pub slope: [f64; 2],
+    pub q: [f64; 3],
+    /// The ray of the points' mean.
+    pub ray: [f64; 3],
     pub points: f64,
-    /// The mean square deviation.
+    /// The mean square deviation of inverse depths; infinite where the points are not on one surface.
     pub unevenness: f64,
+    /// How much the inverse depth changes from pixel to pixel along the steepest direction, squared; 0 there.
+    pub steepness_squared: f64,
 }
 
 impl Plane {
     /// The fewest points that tell how well a plane fits.
     pub(crate) const FEWEST: f64 = 6.0;
-    /// Points are on one line of the image if the determinant of their positions' scatter is at most this share of
-    /// the product of its diagonal: rounding.
+    /// Seen from the camera, points are on one line if the determinant of their covariance matrix is at most this share of
+    /// the square of half its trace: rounding.
     pub(crate) const LINE: f64 = 1e-6;
+    /// The largest variance along the line of sight, as a share of the mean's square, with which depths are much the same:
+    /// else points are not on one surface.
+    pub(crate) const DEEP: f64 = 0.25;
 
-    /// None if there are too few finite points to tell how well the plane fits, or if they are on one line of the
-    /// image.
+    /// None if there are too few finite points to tell how well the plane fits, or if they are on one line of the image.
     pub fn of(cloud: &Cloud, rect: &Rect) -> Option<Plane> {
-        let place = |(x, y): (usize, usize)| {
-            [x as f64, y as f64, f64::from(inverse_depth(cloud.depths[cloud.index(x, y)]))]
-        };
-        let points = || rect.pixels().map(place).filter(|point| !point[2].is_nan());
-        let Scatter { matrix, mean, count: n } = Scatter::of(points)?;
+        let scatter = Scatter::of(|| cloud.finite(rect))?;
+        let (m, n) = (scatter.mean, scatter.count);
         if n < Self::FEWEST {
             return None;
         }
-        let Symmetric3 { xx, xy, xz: xr, yy, yz: yr, zz: rr } = matrix;
-        let determinant = xx * yy - xy * xy;
-        if determinant <= Self::LINE * xx * yy {
+        let covariance = scatter.covariance();
+        let adjugate = covariance.adjugate();
+        let [across, along] = [&adjugate, &covariance].map(|matrix| matrix.times(m));
+        let (spread, length2, along) = (dot(m, across), dot(m, m), dot(m, along));
+        // Times the square of the length.
+        let half_trace = (covariance.trace() * length2 - along) / 2.0;
+        let is_deep = Self::DEEP * length2 * length2 < along;
+        if !is_deep && spread * length2 <= Self::LINE * half_trace * half_trace {
             return None;
         }
-        let slope = [(xr * yy - yr * xy) / determinant, (yr * xx - xr * xy) / determinant];
-        let unevenness = (rr - slope[0] * xr - slope[1] * yr).max(0.0) / (n - 3.0);
-        Some(Plane { center: [mean[0], mean[1]], offset: mean[2], slope, points: n, unevenness })
+        let Symmetric3 { xx, xy, xz, .. } = covariance;
+        let determinant = xx * adjugate.xx + xy * adjugate.xy + xz * adjugate.xz;
+        let determinant = determinant.max(0.0);
+        // C q = m (1 - q m), which makes the sum least, is solved by:
+        let q = across.map(|value| value / (spread + determinant));
+        let deviation2 = determinant / (spread + determinant) * n / (n - 3.0);
+        // Of the inverse depth, by the rays across them.
+        let (depth, slope2) = if cloud.has_range {
+            (length2.sqrt(), dot(q, q) - dot(q, m).powi(2) / length2)
+        } else {
+            (m[2], q[0] * q[0] + q[1] * q[1])
+        };
+        let depth2 = depth * depth;
+        // Between the rays of neighbours, from how far those of n pixels spread.
+        let angle2 = 12.0 / (n - 1.0) * (spread / (depth2 * depth2 * depth2)).sqrt();
+        Some(Plane {
+            q,
+            ray: m.map(|mean| mean / depth),
+            points: n,
+            unevenness: if is_deep { f64::INFINITY } else { deviation2 / depth2 },
+            steepness_squared: if is_deep { 0.0 } else { slope2 * angle2 },
+        })
     }
 
-    /// The inverse depth at a position.
-    pub fn at(&self, [x, y]: [f64; 2]) -> f64 {
-        self.offset + self.slope[0] * (x - self.center[0]) + self.slope[1] * (y - self.center[1])
+    /// The inverse depth along a ray.
+    pub fn at(&self, ray: [f64; 3]) -> f64 {
+        dot(self.q, ray)
     }
+}
 
-    /// How much the inverse depth changes from pixel to pixel along the steepest direction, squared.
-    pub fn steepness_squared(&self) -> f64 {
-        let [x, y] = self.slope;
-        x * x + y * y
-    }
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// NaN at a missing point, and at depth 0.

@@ -25,17 +25,15 @@ pub(crate) trait Engine {
     /// The threads.
     fn workers(&self) -> &Workers;
 
-    /// Every pixel's window, 0 for none, as a radius, or in PCL's semantics as a side; and its estimate.
-    fn windows(&mut self, sizes: &mut Vec<u32>, estimates: &mut Vec<[f32; 4]>)
-    -> Result<(), Error>;
+    /// Every pixel's window, and its estimate.
+    fn windows(&mut self, found: &mut Windows) -> Result<(), Error>;
 
-    /// The even windows of the needed blocks.
-    fn even_windows(
+    /// As [`Engine::windows`], and the even windows of all blocks, with their estimates if the method is CM.
+    fn windows_and_even(
         &mut self,
         cloud: &Cloud,
         asked: &Asked,
-        needed: &[bool],
-        windows: &mut Vec<EvenWindow>,
+        found: &mut Windows,
     ) -> Result<(), Error>;
 
     /// The block whose window each pixel takes, or [`NO_WINDOW`].
@@ -50,25 +48,38 @@ pub(crate) trait Engine {
     ) -> Result<(), Error>;
 }
 
+/// The windows, and what they give.
+#[derive(Debug, Default)]
+pub(crate) struct Windows {
+    /// Of the first pass, pixel by pixel: 0 for none, as a radius, or in PCL's semantics as a side.
+    pub sizes: Vec<u32>,
+    pub estimates: Vec<[f32; 4]>,
+    /// Block by block.
+    pub even: Vec<EvenWindow>,
+    pub of_even: Vec<[f32; 4]>,
+}
+
+impl Windows {
+    /// Bytes held.
+    fn size(&self) -> usize {
+        bytes(&self.sizes) + bytes(&self.estimates) + bytes(&self.even) + bytes(&self.of_even)
+    }
+}
+
 /// The tables of the image, kept from frame to frame.
 #[derive(Debug, Default)]
 pub(crate) struct SecondPass {
-    /// The first pass' windows and estimates.
-    sizes: Vec<u32>,
-    estimates: Vec<[f32; 4]>,
-    normals: SummedNormals,
-    /// The pixels that another window may serve better than their own.
-    concerned: Vec<bool>,
+    depth_changes: DepthChanges,
     /// As [`Asked`] has them.
     wanted: Vec<u32>,
+    windows: Windows,
+    normals: SummedNormals,
+    /// As [`EvenWindows`] has them.
+    concerned: Vec<bool>,
     levels: Vec<u8>,
-    depth_changes: DepthChanges,
-    needed: Vec<bool>,
-    windows: Vec<EvenWindow>,
     choices: Vec<u32>,
-    /// The radii of the windows that some pixel takes, and their estimates.
+    /// The radii of the even windows that some pixel takes.
     taken: Vec<u32>,
-    second: Vec<[f32; 4]>,
 }
 
 /// As often as a radius can be halved.
@@ -80,18 +91,14 @@ const CREASE_LEVELS: u8 = 2;
 impl SecondPass {
     /// Bytes held.
     pub fn size(&self) -> usize {
-        bytes(&self.sizes)
-            + bytes(&self.estimates)
+        self.depth_changes.size()
+            + bytes(&self.wanted)
+            + self.windows.size()
             + self.normals.size()
             + bytes(&self.concerned)
-            + bytes(&self.wanted)
             + bytes(&self.levels)
-            + self.depth_changes.size()
-            + bytes(&self.needed)
-            + bytes(&self.windows)
             + bytes(&self.choices)
             + bytes(&self.taken)
-            + bytes(&self.second)
     }
 
     /// Makes what [`SecondPass::estimate`] gives those of other points.
@@ -101,93 +108,43 @@ impl SecondPass {
         options: &Options,
         engine: &mut impl Engine,
     ) -> Result<(), Error> {
-        engine.windows(&mut self.sizes, &mut self.estimates)?;
+        let SecondPass { depth_changes, wanted, windows, normals, concerned, levels, .. } = self;
         if !asks(options) {
-            return refill(&mut self.choices, repeat_n(NO_WINDOW, self.estimates.len()));
+            engine.windows(windows)?;
+            return refill(&mut self.choices, repeat_n(NO_WINDOW, cloud.depths.len()));
         }
-        let blocks = Blocks::of(cloud.width, cloud.height);
-        self.concern(cloud, &blocks, options, engine.workers())?;
-        let SecondPass {
-            concerned,
-            wanted,
-            levels,
-            depth_changes,
-            needed,
-            windows,
-            choices,
-            taken,
-            second,
-            ..
-        } = self;
         find_depth_changes(depth_changes, cloud, options, engine.workers())?;
         depth_changes.drop_explained(cloud, engine.workers());
         let clean = depth_changes.clean_radii(cloud.width, cloud.height)?;
-        let least_noise = Asked::least_noise(options.paper.alpha);
+        let blocks = Blocks::of(cloud.width, cloud.height);
+        find_wanted(wanted, cloud, &blocks, options, engine.workers())?;
         let limit = options.paper.largest_radius;
-        let asked = Asked { blocks, concerned, wanted, levels, clean, limit, least_noise };
-        asked.needed(needed)?;
-        engine.even_windows(cloud, &asked, needed, windows)?;
-        let even = EvenWindows { cloud, asked: &asked, options, windows };
-        engine.choices(&even, choices)?;
+        let least_noise = Asked::least_noise(options.paper.alpha);
+        let asked = Asked { blocks, wanted, clean, limit, least_noise };
+        engine.windows_and_even(cloud, &asked, windows)?;
+        if options.crease_windows {
+            normals.sum(&windows.estimates, &blocks, engine.workers())?;
+        }
+        refill(concerned, repeat_n(false, cloud.depths.len()))?;
+        refill(levels, repeat_n(0, blocks.count()))?;
+        let concern = Concern { cloud, options, blocks: &blocks, windows, normals };
+        concern.find(concerned, levels, engine.workers());
+        let windows = &windows.even;
+        let even = EvenWindows { cloud, asked: &asked, options, concerned, levels, windows };
+        engine.choices(&even, &mut self.choices)?;
+        if options.method == Method::CovarianceMatrix {
+            return Ok(());
+        }
+        let taken = &mut self.taken;
         refill(taken, repeat_n(0, blocks.count()))?;
         // Marked first, as many pixels take the same.
-        for block in choices.iter().filter(|choice| **choice != NO_WINDOW) {
+        for block in self.choices.iter().filter(|choice| **choice != NO_WINDOW) {
             taken[*block as usize] = 1;
         }
         for (block, radius) in taken.iter_mut().enumerate().filter(|(_, taken)| **taken > 0) {
             *radius = even.radius(block);
         }
-        engine.of_blocks(&blocks, taken, second)
-    }
-
-    /// Finds the pixels that another window may serve better than their own.
-    fn concern(
-        &mut self,
-        cloud: &Cloud,
-        blocks: &Blocks,
-        options: &Options,
-        workers: &Workers,
-    ) -> Result<(), Error> {
-        let SecondPass { estimates, sizes, wanted, concerned, levels, normals, .. } = self;
-        if options.crease_windows {
-            normals.sum(estimates, blocks, workers)?;
-        }
-        refill(concerned, repeat_n(false, sizes.len()))?;
-        refill(wanted, repeat_n(0, blocks.count()))?;
-        refill(levels, repeat_n(0, blocks.count()))?;
-        let (estimates, sizes, normals) = (&*estimates, &*sizes, &*normals);
-        // The window and the level of a block; marks its pixels, of which `concerned` starts with number `first`.
-        let concern = |pixels: [usize; BLOCK * BLOCK], first: usize, concerned: &mut [bool]| {
-            let has_window = |at: usize| sizes[at] > 0 && !cloud.is_missing(at);
-            let middle = pixels[MIDDLE * BLOCK + MIDDLE];
-            let with_window = || once(middle).chain(pixels).find(|at| has_window(*at));
-            let normals_vary =
-                |at: usize| normals.vary_in(&window_of_size(cloud, options, at, sizes[at]));
-            let is_near_crease = options.crease_windows && with_window().is_some_and(normals_vary);
-            let (mut largest, mut level) = (0, 0);
-            for at in pixels {
-                let size = wanted_size(cloud, options, at);
-                largest = size.max(largest);
-                let has_none = || estimates[at][0].is_nan() && !cloud.is_missing(at);
-                if options.one_sided_windows && (sizes[at] < size || has_none()) {
-                    concerned[at - first] = true;
-                    level = EVERY_LEVEL;
-                } else if is_near_crease && has_window(at) {
-                    concerned[at - first] = true;
-                    level = CREASE_LEVELS.max(level);
-                }
-            }
-            (radius_of_size(largest, options).min(options.paper.largest_radius), level)
-        };
-        let rows = concerned.chunks_mut(BLOCK * cloud.width).enumerate();
-        let of_blocks = wanted.chunks_mut(blocks.across).zip(levels.chunks_mut(blocks.across));
-        workers.each(rows.zip(of_blocks), |((row, concerned), (wanted, levels))| {
-            for (column, (wanted, level)) in wanted.iter_mut().zip(levels).enumerate() {
-                let pixels = blocks.pixels((column, row));
-                (*wanted, *level) = concern(pixels, row * BLOCK * cloud.width, concerned);
-            }
-        });
-        Ok(())
+        engine.of_blocks(&blocks, taken, &mut self.windows.of_even)
     }
 
     /// The estimate of a pixel, turned to the viewpoint: near depth changes and near creases from even windows, as the
@@ -206,12 +163,16 @@ impl SecondPass {
     #[inline(always)]
     pub fn found(&self, at: usize) -> &[f32; 4] {
         let choice = self.choices[at];
-        if choice == NO_WINDOW { &self.estimates[at] } else { &self.second[choice as usize] }
+        if choice == NO_WINDOW {
+            &self.windows.estimates[at]
+        } else {
+            &self.windows.of_even[choice as usize]
+        }
     }
 
     /// The estimate of a pixel whose window has no normal.
     fn estimate_around(&self, cloud: &Cloud, options: &Options, at: usize) -> Estimate {
-        let first = self.estimates[at];
+        let first = self.windows.estimates[at];
         if !first[0].is_nan() || !options.one_sided_windows || cloud.is_missing(at) {
             return first.into();
         }
@@ -226,6 +187,80 @@ impl SecondPass {
         let has_curvature = options.method == Method::CovarianceMatrix;
         Estimate { normal, curvature: if has_curvature { found.curvature } else { f32::NAN } }
     }
+}
+
+/// Which pixels another window may serve better than their own.
+struct Concern<'a> {
+    cloud: &'a Cloud,
+    options: &'a Options,
+    blocks: &'a Blocks,
+    windows: &'a Windows,
+    normals: &'a SummedNormals,
+}
+
+impl Concern<'_> {
+    /// Marks them, and the levels of their blocks.
+    fn find(&self, concerned: &mut [bool], levels: &mut [u8], workers: &Workers) {
+        let &Concern { cloud, blocks, .. } = self;
+        let rows = concerned.chunks_mut(BLOCK * cloud.width).enumerate();
+        workers.each(rows.zip(levels.chunks_mut(blocks.across)), |((row, concerned), levels)| {
+            for (column, level) in levels.iter_mut().enumerate() {
+                let pixels = blocks.pixels((column, row));
+                *level = self.level(pixels, row * BLOCK * cloud.width, concerned);
+            }
+        });
+    }
+
+    /// The level of a block; marks its pixels, of which `concerned` starts with number `first`.
+    fn level(&self, pixels: [usize; BLOCK * BLOCK], first: usize, concerned: &mut [bool]) -> u8 {
+        let &Concern { cloud, options, windows: Windows { sizes, estimates, .. }, .. } = self;
+        let has_window = |at: usize| sizes[at] > 0;
+        let middle = pixels[MIDDLE * BLOCK + MIDDLE];
+        let with_window = || once(middle).chain(pixels).find(|at| has_window(*at));
+        let normals_vary =
+            |at: usize| self.normals.vary_in(&window_of_size(cloud, options, at, sizes[at]));
+        let is_near_crease = options.crease_windows && with_window().is_some_and(normals_vary);
+        let mut level = 0;
+        for at in pixels {
+            let has_none = || estimates[at][0].is_nan() && !cloud.is_missing(at);
+            if options.one_sided_windows
+                && (sizes[at] < wanted_size(cloud, options, at) || has_none())
+            {
+                concerned[at - first] = true;
+                level = EVERY_LEVEL;
+            } else if is_near_crease && has_window(at) {
+                concerned[at - first] = true;
+                level = CREASE_LEVELS.max(level);
+            }
+        }
+        level
+    }
+}
+
+/// The radii that the depths ask for, block by block: the largest of a block's pixels.
+fn find_wanted(
+    wanted: &mut Vec<u32>,
+    cloud: &Cloud,
+    blocks: &Blocks,
+    options: &Options,
+    workers: &Workers,
+) -> Result<(), Error> {
+    refill(wanted, repeat_n(0, blocks.count()))?;
+    let is_paper = options.semantics == Semantics::Paper;
+    workers.each(wanted.chunks_mut(blocks.across).enumerate(), |(row, wanted)| {
+        for (column, wanted) in wanted.iter_mut().enumerate() {
+            // Where the depth asks for most.
+            let pixels = blocks.pixels((column, row));
+            let most = pixels.into_iter().fold((pixels[0], f32::NEG_INFINITY), |most, at| {
+                let depth = cloud.depths[at];
+                let depth = if is_paper { depth.abs() } else { depth };
+                if depth > most.1 { (at, depth) } else { most }
+            });
+            let size = wanted_size(cloud, options, most.0);
+            *wanted = radius_of_size(size, options).min(options.paper.largest_radius);
+        }
+    });
+    Ok(())
 }
 
 /// Whether the options ask for a second pass.

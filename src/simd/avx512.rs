@@ -74,6 +74,7 @@ impl Simd for Avx512 {
         sub_d(a: Self::D, b: Self::D) -> Self::D = _mm512_sub_pd;
         mul_d(a: Self::D, b: Self::D) -> Self::D = _mm512_mul_pd;
         div_d(a: Self::D, b: Self::D) -> Self::D = _mm512_div_pd;
+        sqrt_d(a: Self::D) -> Self::D = _mm512_sqrt_pd;
         max_d(a: Self::D, b: Self::D) -> Self::D = _mm512_max_pd;
         widen(a: Self::F) -> Self::D = _mm512_cvtps_pd;
         narrow(a: Self::D) -> Self::F = _mm512_cvtpd_ps;
@@ -221,6 +222,7 @@ impl Simd for Avx512Pair {
         sub_d(a: Self::D, b: Self::D) -> Self::D = TwoGroups::sub_d;
         mul_d(a: Self::D, b: Self::D) -> Self::D = TwoGroups::mul_d;
         div_d(a: Self::D, b: Self::D) -> Self::D = TwoGroups::div_d;
+        sqrt_d(a: Self::D) -> Self::D = TwoGroups::sqrt_d;
         max_d(a: Self::D, b: Self::D) -> Self::D = TwoGroups::max_d;
         bits_lt_d(a: Self::D, b: Self::D) -> u32 = TwoGroups::bits_lt_d;
         select_bits_d(lanes: u32, yes: Self::D, no: Self::D) -> Self::D = TwoGroups::select_bits_d;

@@ -77,6 +77,7 @@ pub(crate) trait Simd: Copy {
     unsafe fn sub_d(a: Self::D, b: Self::D) -> Self::D;
     unsafe fn mul_d(a: Self::D, b: Self::D) -> Self::D;
     unsafe fn div_d(a: Self::D, b: Self::D) -> Self::D;
+    unsafe fn sqrt_d(a: Self::D) -> Self::D;
     unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D;
     /// Bit l is `a < b` in lane l.
     unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32;

@@ -241,6 +241,10 @@ impl Simd for Neon {
         unsafe { each!(vdivq_f64, a, b) }
     }
     #[inline(always)]
+    unsafe fn sqrt_d(a: Self::D) -> Self::D {
+        unsafe { each!(vsqrtq_f64, a) }
+    }
+    #[inline(always)]
     unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D {
         unsafe { pick!(vcgtq_f64, vbslq_f64, a, b) }
     }

@@ -219,6 +219,10 @@ impl Simd for Portable {
         zip(a, b, |a, b| a / b)
     }
     #[inline(always)]
+    unsafe fn sqrt_d(a: D) -> D {
+        zip(a, a, |a, _| a.sqrt())
+    }
+    #[inline(always)]
     unsafe fn max_d(a: D, b: D) -> D {
         zip(a, b, |a, b| if a > b { a } else { b })
     }

@@ -123,6 +123,7 @@ unsafe fn of_lanes<S: Simd>(a: &[f32; 16], b: &[f32; 16]) -> Results {
             S::sub_d(dx, dy),
             S::mul_d(dx, dy),
             S::div_d(dx, dy),
+            S::sqrt_d(dx),
             S::max_d(dx, dy),
             S::select_bits_d(bits, dx, dy),
             S::load_d(loaded.as_ptr()),

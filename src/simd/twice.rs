@@ -46,6 +46,7 @@ impl<S: Simd> Simd for Twice<S> {
         sub_d(a: D, b: D) -> D;
         mul_d(a: D, b: D) -> D;
         div_d(a: D, b: D) -> D;
+        sqrt_d(a: D) -> D;
         max_d(a: D, b: D) -> D;
         widen(a: F) -> D;
         narrow(a: D) -> F;

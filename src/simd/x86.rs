@@ -232,6 +232,10 @@ impl Simd for Sse2 {
         unsafe { each!(_mm_div_pd, a, b) }
     }
     #[inline(always)]
+    unsafe fn sqrt_d(a: Self::D) -> Self::D {
+        unsafe { each!(_mm_sqrt_pd, a) }
+    }
+    #[inline(always)]
     unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D {
         unsafe { each!(_mm_max_pd, a, b) }
     }
@@ -583,6 +587,10 @@ impl Simd for Avx2 {
     #[inline(always)]
     unsafe fn div_d(a: Self::D, b: Self::D) -> Self::D {
         unsafe { each!(_mm256_div_pd, a, b) }
+    }
+    #[inline(always)]
+    unsafe fn sqrt_d(a: Self::D) -> Self::D {
+        unsafe { each!(_mm256_sqrt_pd, a) }
     }
     #[inline(always)]
     unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D {

@@ -6,7 +6,7 @@ use std::iter::repeat_n;
 
 use super::windows::least_depth_change;
 use crate::Error;
-use crate::fast::arithmetic::Floats;
+use crate::fast::arithmetic::{Floats, dot};
 use crate::fast::lanes::{LANES, Lanes};
 use crate::fast::tile::Bits;
 use crate::fast::windows::threshold;
@@ -38,17 +38,21 @@ pub(super) unsafe fn rows<S: Groups>(
     let [noise, there, exact] = [least_noise; 3];
     let mut found = Found { candidates, number: 0, least_noise, noise, there, exact };
     for (row, choices) in rows {
-        let levels = &even.asked.levels[row * across..][..across];
+        let levels = &even.levels[row * across..][..across];
         make_room(concerned, across)?;
         concerned.extend((0..across).filter(|block| levels[*block] > 0));
-        image_rows.read(even, row)?;
+        if concerned.is_empty() {
+            continue;
+        }
+        // SAFETY: as the caller's.
+        unsafe { image_rows.read::<S::Widest>(even, row)? };
         for blocks in concerned.chunks(S::Widest::LANES) {
             let group = Group { even, row, blocks };
             // SAFETY: as the caller's.
             unsafe {
                 group.candidates(&mut found);
                 found.weigh();
-                group.choose(&mut found, &image_rows.around(blocks), choices);
+                group.choose(&mut found, image_rows, choices);
             }
         }
     }
@@ -120,7 +124,9 @@ struct Windows<S: Simd> {
     /// Where their middles are, from the blocks' middle pixels.
     middle: [Floats<S>; 2],
     radius: Floats<S>,
-    planes: Inclined<S>,
+    planes: Planes<S>,
+    /// The rays of their mean points.
+    ray: [Floats<S>; 3],
     per_bend: Floats<S>,
     /// What they cost any pixel; infinite for those that may not take theirs.
     even: Floats<S>,
@@ -128,28 +134,24 @@ struct Windows<S: Simd> {
     jitter: Floats<S>,
 }
 
-const WINDOW_FIELDS: usize = 9;
+const WINDOW_FIELDS: usize = 12;
 
-/// Planes by their inverse depths at the blocks' middle pixels, and their changes per pixel to the right and down.
+/// Planes q P = 1.
 #[derive(Clone, Copy)]
-struct Inclined<S: Simd> {
-    at_middle: Floats<S>,
-    slope: [Floats<S>; 2],
-}
+struct Planes<S: Simd>([Floats<S>; 3]);
 
-impl<S: Simd> Inclined<S> {
-    /// The inverse depths so far from the blocks' middle pixels.
+impl<S: Simd> Planes<S> {
+    /// The inverse depths along rays.
     #[inline(always)]
-    fn at(&self, [x, y]: [Floats<S>; 2]) -> Floats<S> {
-        self.at_middle + self.slope[0] * x + self.slope[1] * y
+    fn at(&self, ray: [Floats<S>; 3]) -> Floats<S> {
+        dot(self.0, ray)
     }
 
-    /// How far the inverse depths are above the others'.
+    /// How far the inverse depths are above the others', as planes.
     #[inline(always)]
-    fn minus(&self, other: &Inclined<S>) -> Inclined<S> {
-        let [across, down] = self.slope;
-        let slope = [across - other.slope[0], down - other.slope[1]];
-        Inclined { at_middle: self.at_middle - other.at_middle, slope }
+    fn minus(&self, other: &Self) -> Self {
+        let Planes([x, y, z]) = other;
+        Planes([self.0[0] - *x, self.0[1] - *y, self.0[2] - *z])
     }
 }
 
@@ -162,6 +164,7 @@ struct Pixels<S: Simd> {
     at: [Floats<S>; 2],
     /// The mask of those that take a window.
     there: Floats<S>,
+    ray: [Floats<S>; 3],
     inverse_depth: Floats<S>,
     tolerance: Floats<S>,
     near: Near<S>,
@@ -171,7 +174,7 @@ struct Pixels<S: Simd> {
 #[derive(Clone, Copy)]
 struct Near<S: Simd> {
     inverse_depth: Floats<S>,
-    at: [Floats<S>; 2],
+    ray: [Floats<S>; 3],
     points: Floats<S>,
 }
 
@@ -184,17 +187,17 @@ impl<S: Simd> Windows<S> {
     unsafe fn none() -> Self {
         // SAFETY: as the caller's.
         let [zero, even] = unsafe { [0.0, f32::INFINITY].map(|value| Floats::splat(value)) };
-        let planes = Inclined { at_middle: zero, slope: [zero; 2] };
-        Windows { middle: [zero; 2], radius: zero, planes, per_bend: zero, even, jitter: zero }
+        let (middle, planes, ray) = ([zero; 2], Planes([zero; 3]), [zero; 3]);
+        Windows { middle, radius: zero, planes, ray, per_bend: zero, even, jitter: zero }
     }
 
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn store(&self, to: &mut [Lanes; WINDOW_FIELDS]) {
-        let Windows { middle: [dx, dy], radius, planes, per_bend, even, jitter } = *self;
-        let Inclined { at_middle, slope: [across, down] } = planes;
-        let fields = [dx, dy, radius, at_middle, across, down, per_bend, even, jitter];
+        let Windows { middle: [dx, dy], radius, planes, ray, per_bend, even, jitter } = *self;
+        let (Planes([a, b, c]), [x, y, z]) = (planes, ray);
+        let fields = [dx, dy, radius, a, b, c, x, y, z, per_bend, even, jitter];
         for i in 0..WINDOW_FIELDS {
             // SAFETY: as the caller's; the array holds so many lanes.
             unsafe { S::store(to[i].0.as_mut_ptr(), fields[i].0) };
@@ -213,9 +216,9 @@ impl<S: Simd> Windows<S> {
             // SAFETY: as the caller's.
             fields[i].0 = unsafe { from[i].load::<S>() };
         }
-        let [dx, dy, radius, at_middle, across, down, per_bend, even, jitter] = fields;
-        let planes = Inclined { at_middle, slope: [across, down] };
-        Windows { middle: [dx, dy], radius, planes, per_bend, even, jitter }
+        let [dx, dy, radius, a, b, c, x, y, z, per_bend, even, jitter] = fields;
+        let (planes, ray) = (Planes([a, b, c]), [x, y, z]);
+        Windows { middle: [dx, dy], radius, planes, ray, per_bend, even, jitter }
     }
 
     /// Takes the others of a mask.
@@ -223,9 +226,11 @@ impl<S: Simd> Windows<S> {
     fn take(&mut self, mask: S::F, other: &Self) {
         for axis in 0..2 {
             self.middle[axis].take(mask, other.middle[axis]);
-            self.planes.slope[axis].take(mask, other.planes.slope[axis]);
         }
-        self.planes.at_middle.take(mask, other.planes.at_middle);
+        for i in 0..3 {
+            self.planes.0[i].take(mask, other.planes.0[i]);
+            self.ray[i].take(mask, other.ray[i]);
+        }
         self.radius.take(mask, other.radius);
         self.per_bend.take(mask, other.per_bend);
         self.even.take(mask, other.even);
@@ -238,19 +243,19 @@ impl<S: Simd> Windows<S> {
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn cost(&self, pixels: &Pixels<S>, noise: Floats<S>) -> Floats<S> {
-        let &Windows { middle: [dx, dy], radius, planes, per_bend, even, jitter } = self;
-        let Near { inverse_depth, at, points } = pixels.near;
+        let &Windows { middle: [dx, dy], radius, planes, per_bend, even, jitter, .. } = self;
+        let Near { inverse_depth, ray, points } = pixels.near;
         // SAFETY: as the caller's.
         unsafe {
             let (zero, one) = (Floats::splat(0.0), Floats::splat(1.0));
-            let astray = inverse_depth - planes.at(at);
+            let astray = inverse_depth - planes.at(ray);
             let near_noise = Floats::splat(NEAR_NOISE) * noise / points;
             let astray = (astray * astray - near_noise).max(zero);
             let [x, y] = pixels.at;
             let distance = (x - dx).abs().max((y - dy).abs());
             let short = (distance - radius).max(zero);
             let cost = (even + astray * (Floats::splat(NEAR) * per_bend)) * (one + short * short);
-            let off = (pixels.inverse_depth - planes.at(pixels.at)).abs();
+            let off = (pixels.inverse_depth - planes.at(pixels.ray)).abs();
             let lies_in = S::lt(off.0, (pixels.tolerance + jitter).0);
             let is_beyond = S::and_not(lies_in, S::lt(zero.0, short.0));
             Floats(S::select(is_beyond, S::splat(f32::INFINITY), cost.0))
@@ -259,12 +264,28 @@ impl<S: Simd> Windows<S> {
 }
 
 impl<S: Simd> Pixels<S> {
+    /// None that takes a window.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn none() -> Self {
+        // SAFETY: as the caller's.
+        let [number, there, inverse_depth, tolerance, points] = [unsafe { Floats::splat(0.0) }; 5];
+        let ray = [number; 3];
+        let near = Near { inverse_depth, ray, points };
+        Pixels { number, at: [number; 2], there, ray, inverse_depth, tolerance, near }
+    }
+
     /// Takes the others of a mask.
     #[inline(always)]
     fn take(&mut self, mask: S::F, other: &Self) {
         for axis in 0..2 {
             self.at[axis].take(mask, other.at[axis]);
-            self.near.at[axis].take(mask, other.near.at[axis]);
+        }
+        for i in 0..3 {
+            self.ray[i].take(mask, other.ray[i]);
+            self.near.ray[i].take(mask, other.near.ray[i]);
         }
         self.number.take(mask, other.number);
         self.there.take(mask, other.there);
@@ -315,7 +336,7 @@ impl<S: Along> Found<'_, S> {
         rows: &Lines<S>,
         may_take: S::F,
     ) {
-        const { assert!(size_of::<EvenWindow>() == size_of::<[f32; 8]>()) };
+        const { assert!(size_of::<EvenWindow>() == size_of::<[f32; 12]>()) };
         let place = |lane: usize| columns.first[lane] + rows.first[lane];
         debug_assert!((0..S::LANES).all(|lane| place(lane) < windows.len()));
         let windows = windows.as_ptr();
@@ -324,31 +345,30 @@ impl<S: Along> Found<'_, S> {
         for lane in 0..S::LANES {
             to.places[lane] = place(lane) as u32;
         }
-        // SAFETY: as the caller's; a window is eight floats, and arrays hold so many lanes.
+        // SAFETY: as the caller's; a window is twelve floats, and arrays hold so many lanes.
         unsafe {
             let window = |lane: usize| windows.add(to.places[lane] as usize).cast::<f32>();
-            let first = load_by_fours::<S>(window);
-            let last = load_by_fours::<S>(|lane| window(lane).add(4));
-            let [radius, inverse_depth, across, down] =
-                [Floats(first[0]), Floats(first[1]), Floats(first[2]), Floats(first[3])];
-            let [unevenness, noise, per_noise, per_bend] = last;
+            let [radius, a, b, c] = load_by_fours::<S>(window);
+            let [x, y, z, steepness] = load_by_fours::<S>(|lane| window(lane).add(4));
+            let [unevenness, noise, per_noise, per_bend] =
+                load_by_fours::<S>(|lane| window(lane).add(8));
+            let (radius, steepness) = (Floats(radius), Floats(steepness));
+            let planes = Planes([Floats(a), Floats(b), Floats(c)]);
+            let ray = [Floats(x), Floats(y), Floats(z)];
             let (zero, one) = (S::splat(0.0), S::splat(1.0));
             let middle @ [dx, dy] = [columns.from_own, rows.from_own];
             let is_near = S::lt(dx.abs().max(dy.abs()).0, (radius + Floats::splat(REACH + 1.0)).0);
             let may_take = S::and(may_take, S::and(is_near, S::lt(zero, radius.0)));
-            let at_middle = inverse_depth - across * dx - down * dy;
-            let planes = Inclined { at_middle, slope: [across, down] };
-            let steepness_squared = across * across + down * down;
-            let jitter = Floats::splat(JITTER) * steepness_squared.sqrt();
+            let jitter = Floats::splat(JITTER) * steepness;
             let (per_bend, even) = (Floats(per_bend), Floats(zero));
-            Windows { middle, radius, planes, per_bend, even, jitter }.store(&mut to.windows);
+            Windows { middle, radius, planes, ray, per_bend, even, jitter }.store(&mut to.windows);
             S::store(to.may_take.0.as_mut_ptr(), may_take);
             S::store(to.unevenness.0.as_mut_ptr(), unevenness);
             S::store(to.per_noise.0.as_mut_ptr(), per_noise);
             self.noise.0 = S::select(may_take, S::min(noise, self.noise.0), self.noise.0);
             let is_exact = S::and(
                 S::lt(noise, self.least_noise.0),
-                S::lt(self.least_noise.0, steepness_squared.0),
+                S::lt(self.least_noise.0, (steepness * steepness).0),
             );
             let one = S::and(may_take, one);
             self.there = self.there + Floats(one);
@@ -408,9 +428,12 @@ impl<S: Along> Found<'_, S> {
                 let cost = these.cost(pixels, noise);
                 S::store(candidates.cost.0.as_mut_ptr(), cost.0);
                 let better = S::lt(cost.0, least.0);
-                least.0 = S::select(better, (alike * cost).0, least.0);
-                best = S::select(better, S::splat(number as f32), best);
-                windows.take(better, &these);
+                // Few are.
+                if S::bits(better) != 0 {
+                    least.0 = S::select(better, (alike * cost).0, least.0);
+                    best = S::select(better, S::splat(number as f32), best);
+                    windows.take(better, &these);
+                }
             }
             // By chance the pixel may be nearer to the plane beyond a crease.
             least = Floats::splat(CREASE_COST) * least;
@@ -420,10 +443,13 @@ impl<S: Along> Found<'_, S> {
                 let cost = Floats(candidates.cost.load::<S>());
                 let is_better = S::lt(cost.0, least.0);
                 let crease = Crease::between(&these, &first, noise);
-                let better = S::and(is_better, crease.is_first_side(pixels.at));
-                least.0 = S::select(better, (alike * cost).0, least.0);
-                best = S::select(better, S::splat(number as f32), best);
-                windows.take(better, &these);
+                let better = S::and(is_better, crease.is_first_side(pixels.ray));
+                // Few are.
+                if S::bits(better) != 0 {
+                    least.0 = S::select(better, (alike * cost).0, least.0);
+                    best = S::select(better, S::splat(number as f32), best);
+                    windows.take(better, &these);
+                }
             }
             (Floats(best), windows)
         }
@@ -445,7 +471,7 @@ impl Group<'_> {
         let mut column = Lanes([blocks[0] as f32; LANES]);
         for (lane, block) in blocks.iter().enumerate() {
             let own = row * across + block;
-            levels.0[lane] = f32::from(even.asked.levels[own]);
+            levels.0[lane] = f32::from(even.levels[own]);
             radii.0[lane] = even.asked.largest(own) as f32;
             column.0[lane] = *block as f32;
         }
@@ -490,20 +516,16 @@ impl Group<'_> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn choose<S: Along>(
-        &self,
-        found: &mut Found<'_, S>,
-        around: &Around<S>,
-        choices: &mut [u32],
-    ) {
+    unsafe fn choose<S: Along>(&self, found: &mut Found<'_, S>, rows: &Rows, choices: &mut [u32]) {
         let width = self.even.cloud.width;
         // SAFETY: as the caller's.
         unsafe {
-            let exact = found.is_exact();
-            let mut pixels = [self.pixels(exact, around, 0); BLOCK * BLOCK];
-            for number in 1..BLOCK * BLOCK {
-                pixels[number] = self.pixels(exact, around, number);
+            let mut columns = [0; LANES];
+            for lane in 0..self.blocks.len() {
+                columns[lane] = self.blocks[lane] * BLOCK;
             }
+            let (blocks, exact) = (self.blocks.len(), found.is_exact());
+            let pixels = rows.pixels(&columns, blocks, exact, self.even.options);
             let mut first = pixels[MIDDLE * BLOCK + MIDDLE];
             for other in &pixels {
                 first.take(S::and_not(first.there.0, other.there.0), other);
@@ -529,11 +551,11 @@ impl Group<'_> {
                 let (alike, times) = (Floats::splat(ALIKE), Floats::splat(ALIKE * CREASE_COST));
                 let is_better = S::lt(second_cost.0, (alike * first_cost).0);
                 let to_first = S::and(
-                    crease.is_first_side(own.at),
+                    crease.is_first_side(own.ray),
                     S::lt(first_cost.0, (times * second_cost).0),
                 );
                 let to_second = S::and(
-                    crease.is_second_side(own.at),
+                    crease.is_second_side(own.ray),
                     S::lt(second_cost.0, (times * first_cost).0),
                 );
                 let takes_second = S::or(S::and_not(to_first, is_better), to_second);
@@ -552,29 +574,6 @@ impl Group<'_> {
             }
         }
     }
-
-    /// The pixels of a number in the blocks; `exact` as [`Found::is_exact`] has it.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    unsafe fn pixels<S: Along>(&self, exact: S::F, around: &Around<S>, number: usize) -> Pixels<S> {
-        let place = [number % BLOCK, number / BLOCK];
-        // SAFETY: as the caller's.
-        unsafe {
-            let depth = around.depths[place[1]][place[0]];
-            let clean = around.clean[place[1]][place[0]];
-            let noisy = S::and_not(exact, S::lt(S::splat(0.0), clean));
-            Pixels {
-                number: Floats::splat(number as f32),
-                at: [from_middle(place[0]), from_middle(place[1])],
-                there: Floats(S::eq(depth, depth)),
-                inverse_depth: Floats(around.inverse_depths[place[1] + 1][place[0] + 1]),
-                tolerance: tolerance::<S>(depth, self.even.options),
-                near: around.near(place, noisy),
-            }
-        }
-    }
 }
 
 /// How far a column or row of a block is from its middle.
@@ -589,7 +588,7 @@ unsafe fn from_middle<S: Simd>(line: usize) -> Floats<S> {
 
 /// Whether and where the planes of two windows of each block meet between the middles of both.
 struct Crease<S: Simd> {
-    gap: Inclined<S>,
+    gap: Planes<S>,
     /// How far the first plane is above the second one in the middle of the first window.
     here: Floats<S>,
     /// The mask of the blocks that have one.
@@ -602,7 +601,7 @@ impl<S: Simd> Crease<S> {
     #[inline(always)]
     unsafe fn between(first: &Windows<S>, second: &Windows<S>, noise: Floats<S>) -> Self {
         let gap = first.planes.minus(&second.planes);
-        let (here, there) = (gap.at(first.middle), gap.at(second.middle));
+        let (here, there) = (gap.at(first.ray), gap.at(second.ray));
         // SAFETY: as the caller's.
         unsafe {
             let least_gap = Floats::<S>(S::min(here.abs().0, there.abs().0));
@@ -613,15 +612,15 @@ impl<S: Simd> Crease<S> {
         }
     }
 
-    /// The mask of the blocks that have a crease and a position on the first window's side of it: there the same plane is
-    /// in front as in the middle of that window.
+    /// The mask of the blocks that have a crease and a ray on the first window's side of it: there the same plane is in
+    /// front as in the middle of that window.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn is_first_side(&self, at: [Floats<S>; 2]) -> S::F {
+    unsafe fn is_first_side(&self, ray: [Floats<S>; 3]) -> S::F {
         // SAFETY: as the caller's.
-        unsafe { S::and(self.there, S::lt(S::splat(0.0), (self.here * self.gap.at(at)).0)) }
+        unsafe { S::and(self.there, S::lt(S::splat(0.0), (self.here * self.gap.at(ray)).0)) }
     }
 
     /// As [`Crease::is_first_side`], of the second window.
@@ -629,9 +628,9 @@ impl<S: Simd> Crease<S> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn is_second_side(&self, at: [Floats<S>; 2]) -> S::F {
+    unsafe fn is_second_side(&self, ray: [Floats<S>; 3]) -> S::F {
         // SAFETY: as the caller's.
-        unsafe { S::and(self.there, S::lt((self.here * self.gap.at(at)).0, S::splat(0.0))) }
+        unsafe { S::and(self.there, S::lt((self.here * self.gap.at(ray)).0, S::splat(0.0))) }
     }
 }
 
@@ -693,109 +692,239 @@ unsafe fn tolerance<S: Simd>(depth: S::F, options: &Options) -> Floats<S> {
     }
 }
 
-/// Rows and columns of a block's pixels and those around it, and columns that are read of them.
+/// Rows of a block's pixels and those around it.
 const AROUND: usize = BLOCK + 2;
-const READ: usize = AROUND.next_multiple_of(4);
+/// Columns that are read of a block.
+const READ: usize = BLOCK.next_multiple_of(4);
 
-/// The rows of the image around a row of blocks.
+/// The inverse depths of points, and x, y and z of their rays; z only where depths are distances, else it is 1.
+const FIELDS: usize = 4;
+
+/// The rows of the image around a row of blocks. In each there is a column before the image's, and room behind it for what
+/// is read of the last block.
 #[derive(Debug, Default)]
 struct Rows {
-    /// Elements of a row: a column before the image's, and room behind it for what is read of the last block.
+    /// Columns of the image, and elements of a row.
+    width: usize,
     length: usize,
-    /// `AROUND` rows; NaN outside the image.
-    inverse_depths: Vec<f32>,
+    /// How many of the fields are read.
+    fields: usize,
+    /// `AROUND` rows of each; NaN outside the image.
+    points: [Vec<f32>; FIELDS],
+    /// `BLOCK` rows of each: the means of what is next to the pixels, as the plain form has them, and how many points that is.
+    near: [Vec<f32>; FIELDS],
+    near_points: Vec<f32>,
     /// `BLOCK` rows; NaN for the pixels that are not concerned.
     depths: Vec<f32>,
-    clean: Vec<f32>,
-}
-
-/// The pixels of each block of a group, and those around them: rows of columns.
-struct Around<S: Simd> {
-    inverse_depths: [[S::F; AROUND]; AROUND],
-    depths: [[S::F; BLOCK]; BLOCK],
-    clean: [[S::F; BLOCK]; BLOCK],
+    /// A row of each: the sums over three rows of a column.
+    columns: [Vec<f32>; FIELDS],
+    column_points: Vec<f32>,
 }
 
 impl Rows {
     /// Bytes held.
     fn size(&self) -> usize {
-        bytes(&self.inverse_depths) + bytes(&self.depths) + bytes(&self.clean)
+        let Rows { points, near, near_points, depths, columns, column_points, .. } = self;
+        let fields = [points, near, columns].into_iter().flatten();
+        fields.chain([near_points, depths, column_points]).map(bytes).sum()
     }
 
-    /// Becomes those around another row of blocks.
-    #[inline(always)]
-    fn read(&mut self, even: &EvenWindows, row: usize) -> Result<(), Error> {
-        let &EvenWindows { cloud, asked, .. } = even;
-        let length = 1 + cloud.width + READ;
-        self.length = length;
-        refill(&mut self.inverse_depths, repeat_n(f32::NAN, AROUND * length))?;
-        for of_own in [&mut self.depths, &mut self.clean] {
-            refill(of_own, repeat_n(f32::NAN, BLOCK * length))?;
+    /// Has room for rows of an image of this width, and as many fields.
+    fn resize(&mut self, width: usize, fields: usize) -> Result<(), Error> {
+        let length = (1 + width).next_multiple_of(LANES) + LANES;
+        let Rows { points, near, near_points, depths, columns, column_points, .. } = self;
+        let of_around = points.iter_mut().zip([AROUND; FIELDS]);
+        let of_own = near.iter_mut().chain([near_points, depths]).zip([BLOCK; FIELDS + 2]);
+        let of_one = columns.iter_mut().chain([column_points]).zip([1; FIELDS + 1]);
+        for (rows, count) in of_around.chain(of_own).chain(of_one) {
+            refill(rows, repeat_n(f32::NAN, count * length))?;
         }
-        for line in 0..AROUND {
-            let y = (row * BLOCK + line).wrapping_sub(1);
-            if y >= cloud.height {
-                continue;
-            }
-            let pixels = y * cloud.width..(y + 1) * cloud.width;
-            let depths = &cloud.depths[pixels.clone()];
-            for (to, depth) in self.inverse_depths[line * length + 1..].iter_mut().zip(depths) {
-                *to = inverse_depth(*depth);
-            }
-            if (1..=BLOCK).contains(&line) {
-                let first = (line - 1) * length;
-                let concerned = &asked.concerned[pixels.clone()];
-                let of_own = self.depths[first..].iter_mut().zip(depths.iter().zip(concerned));
-                for (to, (depth, concerned)) in of_own {
-                    *to = if *concerned { *depth } else { f32::NAN };
-                }
-                for (to, clean) in self.clean[first..].iter_mut().zip(&asked.clean[pixels]) {
-                    *to = (*clean).into();
-                }
-            }
-        }
+        (self.width, self.length, self.fields) = (width, length, fields);
         Ok(())
     }
 
-    /// The pixels of some blocks, at most as many as there are lanes; lanes without one have no depth.
+    /// Becomes those around another row of blocks.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn around<S: Along>(&self, blocks: &[usize]) -> Around<S> {
-        let mut columns = [0; LANES];
-        for (to, block) in columns.iter_mut().zip(blocks) {
-            *to = block * BLOCK;
+    unsafe fn read<S: Along>(&mut self, even: &EvenWindows, row: usize) -> Result<(), Error> {
+        let &EvenWindows { cloud, asked, concerned, .. } = even;
+        let fields = if cloud.has_range { FIELDS } else { FIELDS - 1 };
+        if (self.width, self.fields) != (cloud.width, fields) {
+            self.resize(cloud.width, fields)?;
         }
-        assert!(columns.iter().all(|column| column + READ <= self.length));
+        let length = self.length;
+        for line in 0..AROUND {
+            let y = (row * BLOCK + line).wrapping_sub(1);
+            if y < cloud.height {
+                // SAFETY: as the caller's.
+                unsafe { self.read_points::<S>(cloud, y, line * length + 1) };
+            } else {
+                self.points
+                    .iter_mut()
+                    .for_each(|rows| rows[line * length..][..length].fill(f32::NAN));
+            }
+        }
+        for line in 0..BLOCK {
+            let y = row * BLOCK + line;
+            if y >= cloud.height {
+                self.depths[line * length..][..length].fill(f32::NAN);
+                continue;
+            }
+            let pixels = y * cloud.width..(y + 1) * cloud.width;
+            let own = cloud.depths[pixels.clone()].iter().zip(&concerned[pixels.clone()]);
+            for (to, (depth, concerned)) in self.depths[line * length + 1..].iter_mut().zip(own) {
+                *to = if *concerned { *depth } else { f32::NAN };
+            }
+            // SAFETY: as the caller's.
+            unsafe { self.find_near::<S>(line, &asked.clean[pixels]) };
+        }
+        Ok(())
+    }
+
+    /// Reads a row of points, for the elements of the fields from `first` on.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn read_points<S: Along>(&mut self, cloud: &Cloud, y: usize, first: usize) {
+        let fields = self.fields;
+        let start = y * cloud.width;
+        // Points are read by fours of floats: not the last ones of all.
+        let readable = cloud.width.min(cloud.points.len() - start - 1);
+        let whole = readable / S::LANES * S::LANES;
+        for x in (0..whole).step_by(S::LANES) {
+            let points = cloud.points[start + x..][..S::LANES].as_ptr().cast();
+            let depths = cloud.depths[start + x..][..S::LANES].as_ptr();
+            // SAFETY: as the caller's; so many points are there, and so many elements.
+            unsafe {
+                let inverse = S::div(S::splat(1.0), S::load(depths));
+                let inverse = S::select(S::finite(inverse), inverse, S::splat(f32::NAN));
+                let [px, py, pz] = S::load_points(points, size_of::<[f32; 3]>());
+                let rays = [inverse, S::mul(px, inverse), S::mul(py, inverse), S::mul(pz, inverse)];
+                for c in 0..fields {
+                    S::store(self.points[c][first + x..][..S::LANES].as_mut_ptr(), rays[c]);
+                }
+            }
+        }
+        for x in whole..cloud.width {
+            let [px, py, pz] = cloud.ray(start + x);
+            let values = [inverse_depth(cloud.depths[start + x]), px, py, pz];
+            for c in 0..fields {
+                self.points[c][first + x] = values[c];
+            }
+        }
+    }
+
+    /// Finds what is next to the pixels of a line of the blocks, whose clean radii are these.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn find_near<S: Along>(&mut self, line: usize, clean: &[i16]) {
+        let (fields, length) = (self.fields, self.length);
+        let row = |above: usize| (line + above) * length;
+        // SAFETY: as the caller's; rows have room for whole groups.
+        unsafe {
+            let (zero, one) = (S::splat(0.0), S::splat(1.0));
+            for at in (0..length).step_by(S::LANES) {
+                let mut there = [zero; 3];
+                let mut points = zero;
+                for above in 0..3 {
+                    let inverse = S::load(self.points[0][row(above) + at..][..S::LANES].as_ptr());
+                    there[above] = S::eq(inverse, inverse);
+                    points = S::add(points, S::and(there[above], one));
+                }
+                S::store(self.column_points[at..][..S::LANES].as_mut_ptr(), points);
+                for c in 0..fields {
+                    let mut sum = zero;
+                    for above in 0..3 {
+                        let field = S::load(self.points[c][row(above) + at..][..S::LANES].as_ptr());
+                        sum = S::add(sum, S::and(there[above], field));
+                    }
+                    S::store(self.columns[c][at..][..S::LANES].as_mut_ptr(), sum);
+                }
+            }
+            for x in (0..clean.len()).step_by(S::LANES) {
+                let mut own_clean = Lanes::ZERO;
+                for (to, clean) in own_clean.0[..S::LANES].iter_mut().zip(&clean[x..]) {
+                    *to = (*clean).into();
+                }
+                let alone = S::eq(own_clean.load::<S>(), zero);
+                let mut points = zero;
+                for left in 0..3 {
+                    let column = S::load(self.column_points[x + left..][..S::LANES].as_ptr());
+                    points = S::add(points, column);
+                }
+                let to = row(0) + 1 + x;
+                for c in 0..fields {
+                    let mut sum = zero;
+                    for left in 0..3 {
+                        sum =
+                            S::add(sum, S::load(self.columns[c][x + left..][..S::LANES].as_ptr()));
+                    }
+                    let own = S::load(self.points[c][row(1) + 1 + x..][..S::LANES].as_ptr());
+                    let mean = S::select(alone, own, S::div(sum, points));
+                    S::store(self.near[c][to..][..S::LANES].as_mut_ptr(), mean);
+                }
+                let points = S::select(alone, one, points);
+                S::store(self.near_points[to..][..S::LANES].as_mut_ptr(), points);
+            }
+        }
+    }
+
+    /// The pixels of a number in some blocks, at most as many as there are lanes, whose first columns are these: lanes
+    /// without one take no window. Around pixels of the mask `exact` nothing is next to them.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn pixels<S: Along>(
+        &self,
+        columns: &[usize; LANES],
+        blocks: usize,
+        exact: S::F,
+        options: &Options,
+    ) -> [Pixels<S>; BLOCK * BLOCK] {
+        let (fields, length) = (self.fields, self.length);
         // SAFETY: as the caller's; the rows have so many elements from every column on.
         unsafe {
-            let there = S::mask((1 << blocks.len()) - 1);
-            let none = S::splat(f32::NAN);
-            let mut around = Around {
-                inverse_depths: [[none; AROUND]; AROUND],
-                depths: [[none; BLOCK]; BLOCK],
-                clean: [[none; BLOCK]; BLOCK],
-            };
-            for line in 0..AROUND {
-                let row = self.inverse_depths[line * self.length..].as_ptr();
-                let first = columns_from::<S>(row, &columns);
-                let rest = columns_from::<S>(row.add(4), &columns);
-                for column in 0..AROUND {
-                    around.inverse_depths[line][column] =
-                        if column < 4 { first[column] } else { rest[column - 4] };
-                }
-            }
+            let there = S::mask((1 << blocks) - 1);
+            let (none, one) = (S::splat(f32::NAN), S::splat(1.0));
+            let mut pixels = [Pixels::none(); BLOCK * BLOCK];
             for line in 0..BLOCK {
-                let first = line * self.length;
-                let depths = columns_from::<S>(self.depths[first..].as_ptr(), &columns);
-                let clean = columns_from::<S>(self.clean[first..].as_ptr(), &columns);
+                let first = line * length + 1;
+                let depths = columns_from::<S>(&self.depths[first..], columns);
+                let near_points = columns_from::<S>(&self.near_points[first..], columns);
+                let mut own = [[one; 4]; FIELDS];
+                let mut near = [[one; 4]; FIELDS];
+                for c in 0..fields {
+                    own[c] = columns_from::<S>(&self.points[c][first + length..], columns);
+                    near[c] = columns_from::<S>(&self.near[c][first..], columns);
+                }
                 for column in 0..BLOCK {
-                    around.depths[line][column] = S::select(there, depths[column], none);
-                    around.clean[line][column] = clean[column];
+                    let depth = S::select(there, depths[column], none);
+                    let mut of_near = [Floats(one); FIELDS];
+                    for c in 0..fields {
+                        of_near[c] = Floats(S::select(exact, own[c][column], near[c][column]));
+                    }
+                    let [inverse_depth, x, y, z] = of_near;
+                    let points = Floats(S::select(exact, one, near_points[column]));
+                    let number = line * BLOCK + column;
+                    let own_ray = [own[1][column], own[2][column], own[3][column]];
+                    pixels[number] = Pixels {
+                        number: Floats::splat(number as f32),
+                        at: [from_middle(column), from_middle(line)],
+                        there: Floats(S::eq(depth, depth)),
+                        ray: [Floats(own_ray[0]), Floats(own_ray[1]), Floats(own_ray[2])],
+                        inverse_depth: Floats(own[0][column]),
+                        tolerance: tolerance::<S>(depth, options),
+                        near: Near { inverse_depth, ray: [x, y, z], points },
+                    };
                 }
             }
-            around
+            pixels
         }
     }
 }
@@ -803,40 +932,12 @@ impl Rows {
 /// Four columns of a row, from one on for each lane.
 ///
 /// # Safety
-/// The processor has the instruction set of `S`; the row has them.
+/// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn columns_from<S: Along>(row: *const f32, columns: &[usize; LANES]) -> [S::F; 4] {
-    // SAFETY: as the caller's.
-    unsafe { load_by_fours::<S>(|lane| row.add(columns[lane])) }
-}
-
-impl<S: Simd> Around<S> {
-    /// Of the points next to the blocks' pixels in a column and row; around pixels not in the mask `noisy`, of these alone.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    unsafe fn near(&self, [column, row]: [usize; 2], noisy: S::F) -> Near<S> {
-        // SAFETY: as the caller's.
-        unsafe {
-            let zero = Floats::<S>::splat(0.0);
-            let (mut sum, mut offset, mut points) = (zero, [zero; 2], zero);
-            for (line, dy) in (row..row + 3).zip([-1.0, 0.0, 1.0]) {
-                for (column, dx) in (column..column + 3).zip([-1.0, 0.0, 1.0]) {
-                    let inverse = self.inverse_depths[line][column];
-                    let mut there = S::eq(inverse, inverse);
-                    if dx != 0.0 || dy != 0.0 {
-                        there = S::and(there, noisy);
-                    }
-                    sum = sum + Floats(S::and(there, inverse));
-                    offset[0] = offset[0] + Floats(S::and(there, S::splat(dx)));
-                    offset[1] = offset[1] + Floats(S::and(there, S::splat(dy)));
-                    points = points + Floats(S::and(there, S::splat(1.0)));
-                }
-            }
-            let [x, y] = [from_middle::<S>(column), from_middle::<S>(row)];
-            let at = [x + offset[0] / points, y + offset[1] / points];
-            Near { inverse_depth: sum / points, at, points }
-        }
+unsafe fn columns_from<S: Along>(row: &[f32], columns: &[usize; LANES]) -> [S::F; 4] {
+    for column in columns {
+        assert!(column + READ <= row.len());
     }
+    // SAFETY: as the caller's; the row has so many elements.
+    unsafe { load_by_fours::<S>(|lane| row.as_ptr().add(columns[lane])) }
 }

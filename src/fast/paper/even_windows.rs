@@ -1,337 +1,457 @@
-//! Even windows, fast, for one tile of the image: the plain form is in `paper::even_windows`. Planes come from integral
-//! images of the moments of positions and inverse depths, eight pixels at a time.
+//! Even windows, fast, for one tile of the image, eight blocks at a time: the plain form is in `paper::even_windows`. Their
+//! planes come from CM's integral images, as CM's normals of the windows and of the pixels' own do.
 
-use std::ops::Range;
-
-use super::integrals::{Rings, reached};
-use super::layers::{Layer, with_fraction};
-use super::methods::{CovarianceMatrix, MOMENTS};
+use super::integrals::Rings;
+use super::layers::{Layer, Waiting, with_fraction};
+use super::methods::{CovarianceMatrix, MOMENTS, Sums};
 use super::rects::{Pixels, Rects, range};
+use super::tile::{Run, Tile};
 use crate::fast::Parts;
 use crate::fast::arithmetic::{Doubles, Floats};
+use crate::fast::lanes::LANES;
+use crate::fast::moments::Matrices;
+use crate::fast::run::RUN;
+use crate::fast::sink::Sink;
 use crate::fast::tile::Bits;
 use crate::paper::{
     Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, MIDDLE, Plane,
-    ROUNDING, even_window, inverse_depth, middle,
+    even_window, middle,
 };
 use crate::simd::{GROUP, Groups};
 
 /// A window is doubtful if rounding could change its variance, or the least that is told from none, by more than this
 /// share.
-const DOUBT: f64 = 0.25;
+const DOUBT: f64 = 0.02;
 
-/// How many of a tile's points tell what inverse depths are usual, and the share of them that may be farther off than
-/// others hold.
-const SAMPLES: usize = 64;
-const UNUSUAL: usize = 16;
+/// The radius of a window that waits for a layer with all its points.
+const WAITS: f32 = -1.0;
 
-/// Points so many times as near as usual ones are hidden: windows that hold some are doubtful.
-const SPAN: f32 = 64.0;
-
-/// A rectangle of the image whose blocks' even windows are found together.
-pub(super) struct EvenTile<'a> {
+/// The even windows of an image.
+pub(super) struct Even<'a> {
     pub cloud: &'a Cloud,
     pub asked: &'a Asked<'a>,
     /// Block by block.
-    pub needed: &'a [bool],
-    pub columns: Range<usize>,
-    pub rows: Range<usize>,
-    /// The largest radius of a window.
-    pub largest: usize,
+    pub windows: Parts<EvenWindow>,
+    /// For the normals of the pixels and of the blocks, where they are asked for.
+    pub of_pixels: Option<Sink<'a>>,
+    pub of_blocks: Option<Sink<'a>>,
 }
 
-/// Eight windows and their planes.
+/// A rectangle of the image whose blocks' even windows are found together.
+pub(super) struct EvenTile<'a, F> {
+    pub even: &'a Even<'a>,
+    /// The pixels, with windows of their own, and the blocks.
+    pub pixels: Tile<'a, F>,
+    pub blocks: Tile<'a, F>,
+}
+
+/// Eight blocks of a row.
+struct Eight {
+    /// Their middles, inside the image or not.
+    pixels: Pixels,
+    /// The first one's number.
+    block: usize,
+    /// Those whose windows are to be found.
+    asked: u32,
+    /// What the sums' rounding errors stay below.
+    error: f64,
+}
+
+/// The planes through the points of eight windows.
 #[derive(Clone, Copy)]
 struct Fits<S: Groups> {
-    /// 0 for no window.
-    radii: Doubles<S>,
-    /// Of the planes at the pixels.
-    inverse_depth: Doubles<S>,
-    slope: [Doubles<S>; 2],
+    q: [Doubles<S>; 3],
+    ray: [Doubles<S>; 3],
     points: Doubles<S>,
     unevenness: Doubles<S>,
-    /// The variance that the unevenness may be of.
-    noise: Doubles<S>,
+    steepness_squared: Doubles<S>,
+    /// The lanes that have one, those in which rounding may have had a say, and those that hold hidden points.
+    there: u32,
+    doubtful: u32,
+    hidden: u32,
 }
 
 impl<S: Groups> Fits<S> {
+    /// The variance that the unevenness may be of.
+    ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn none() -> Self {
+    unsafe fn noise(&self) -> Doubles<S> {
         // SAFETY: as the caller's.
-        let zero = unsafe { Doubles::splat(0.0) };
-        let [radii, inverse_depth, points, unevenness, noise] = [zero; 5];
-        Fits { radii, inverse_depth, slope: [zero; 2], points, unevenness, noise }
-    }
-
-    /// Takes the lanes of another.
-    #[inline(always)]
-    fn take(&mut self, lanes: u32, other: &Self) {
-        let Fits { radii, inverse_depth, slope: [across, down], points, unevenness, noise } = self;
-        let to = [radii, inverse_depth, across, down, points, unevenness, noise];
-        let [across, down] = other.slope;
-        let Fits { radii, inverse_depth, points, unevenness, noise, .. } = *other;
-        let from = [radii, inverse_depth, across, down, points, unevenness, noise];
-        for (to, from) in to.into_iter().zip(from) {
-            // SAFETY: there is a group, so there is the instruction set.
-            to.0 = unsafe { S::select_bits_d(lanes, from.0, to.0) };
-        }
-    }
-
-    /// Writes the windows of as many lanes as there is room for.
-    #[inline(always)]
-    fn write(&self, windows: &mut [EvenWindow]) {
-        let Fits { radii, inverse_depth, slope: [across, down], points, unevenness, noise } = *self;
-        let mut fields = [[0.0; GROUP]; 7];
-        let values = [radii, inverse_depth, across, down, points, unevenness, noise];
-        for (field, value) in fields.iter_mut().zip(values) {
-            // SAFETY: there is a group, so there is the instruction set.
-            unsafe { S::store(field.as_mut_ptr(), value.narrow().0) };
-        }
-        for (lane, window) in windows.iter_mut().enumerate() {
-            let [radius, inverse_depth, across, down, points, unevenness, noise] =
-                fields.each_ref().map(|field| field[lane]);
-            *window = EvenWindow::default();
-            if radius > 0.0 {
-                let slope = [across, down];
-                let worth = EvenWindow::worth(radius as u32, points);
-                *window = EvenWindow { inverse_depth, slope, unevenness, noise, ..worth };
-            }
+        unsafe {
+            let chance = Floats::splat(2.0) / (self.points.narrow() - Floats::splat(3.0));
+            let chance = Floats::splat(1.0) + Floats::splat(CHANCE) * chance.sqrt();
+            self.unevenness * chance.widen()
         }
     }
 }
 
-impl EvenTile<'_> {
-    /// Writes the windows to those of the image's blocks.
+impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
+    /// The windows of the blocks whose points a layer holds, of those that wait for it, and the normals that are asked for,
+    /// as [`Tile::compute`].
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`; no one else writes the tile's blocks.
+    /// The processor has the instruction set of `S`; no one else writes the tile's blocks and pixels.
     #[inline(always)]
     pub unsafe fn compute<S: Groups>(
         &self,
         rings: &mut Rings<MOMENTS>,
-        windows: &Parts<EvenWindow>,
-    ) {
-        let reach = self.largest;
-        let &Cloud { width, height, ref depths, .. } = self.cloud;
-        let columns = reached(&self.columns, reach, width);
-        let Range { start: top, end: bottom } = reached(&self.rows, reach, height);
-        let [usual, near] = self.usual_inverse_depths();
-        let [x, y] = [columns.start + columns.end, top + bottom].map(|ends| (ends / 2) as f32);
-        let origin = [x, y, usual];
-        let moments = CovarianceMatrix::about(origin);
-        let layer = Layer::of_positions(origin, SPAN * near, reach);
-        rings.start(columns, top, (reach, height), false, &layer);
-        let mut next = top;
-        for y in self.rows.clone().step_by(BLOCK) {
-            let row = middle(y, BLOCK, height);
-            while next < (row + reach + 1).min(bottom) {
-                rings.read_positions(&depths[next * width..], next);
-                // SAFETY: as the caller's.
-                unsafe { rings.push::<S>(&moments, next) };
-                next += 1;
+        layer: &Layer,
+        waiting: &mut Waiting,
+    ) -> Option<f32> {
+        let tile = &self.pixels;
+        let method = CovarianceMatrix::about(layer.origin);
+        // SAFETY: as the caller's.
+        let mut next = unsafe { tile.start::<S, CovarianceMatrix, MOMENTS>(rings, layer) };
+        tile.start_waiting(layer, waiting);
+        let (mut of_pixels, mut of_blocks) = (Run::default(), Run::default());
+        let mut blocks_wait = false;
+        for y in tile.rows.clone() {
+            let has_blocks = y == middle(y - y % BLOCK, BLOCK, self.even.cloud.height);
+            if !has_blocks && self.even.of_pixels.is_none() {
+                continue;
             }
-            rings.aim(row, height);
-            let total = rings.total(next - 1);
-            for x in self.columns.clone().step_by(GROUP * BLOCK) {
-                let block = self.asked.blocks.block(y * width + x);
-                let blocks = block..block + (self.columns.end - x).div_ceil(BLOCK).min(GROUP);
-                // SAFETY: as the caller's.
-                unsafe {
-                    let pixel = (x + MIDDLE, row);
-                    let (found, doubtful) =
-                        self.eight::<S>(rings, &moments, &total, pixel, blocks.clone());
-                    let windows = windows.part(blocks.clone());
-                    found.write(windows);
-                    for lane in Bits(doubtful) {
-                        let window = even_window(self.cloud, self.asked, blocks.start + lane);
-                        windows[lane] = window.unwrap_or_default();
-                    }
+            // SAFETY: as the caller's.
+            unsafe {
+                let error = tile.advance::<S, _, MOMENTS>(&method, rings, &mut next, y);
+                if let Some(sink) = &self.even.of_pixels {
+                    let run = &mut of_pixels;
+                    tile.row::<S, CovarianceMatrix, MOMENTS, true>(
+                        rings, waiting, sink, run, y, error,
+                    );
+                }
+                if has_blocks {
+                    blocks_wait |= self.row::<S>(rings, &method, &mut of_blocks, y, error);
                 }
             }
         }
+        let some_wait = blocks_wait || self.even.of_pixels.is_some() && waiting.is_any();
+        (layer.hides_some() && some_wait).then_some(rings.nearest_hidden)
     }
 
-    /// An inverse depth in the middle of those of some of the tile's points, about which sums lose little; and the magnitude
-    /// of one that few are beyond, infinite if there is none.
-    fn usual_inverse_depths(&self) -> [f32; 2] {
-        let EvenTile { cloud, columns, rows, .. } = self;
-        let sample = |number: usize| {
-            // All over the tile: no two in a row or in a column.
-            let place = |range: &Range<usize>, at: usize| range.start + at * range.len() / SAMPLES;
-            let [x, y] = [place(columns, number * 37 % SAMPLES), place(rows, number)];
-            inverse_depth(cloud.depths[cloud.index(x, y)])
-        };
-        let mut samples: [f32; SAMPLES] = std::array::from_fn(sample);
-        samples.sort_unstable_by(|a, b| a.abs().total_cmp(&b.abs()));
-        // NaN is last.
-        let there = samples.partition_point(|sample| !sample.is_nan());
-        match there.checked_sub(1) {
-            None => [0.0, f32::INFINITY],
-            Some(last) => [samples[there / 2], samples[last - there / UNUSUAL].abs()],
-        }
-    }
-
-    /// The windows of at most eight `blocks`, of which `pixel` is the first one's middle, inside the image or not; and
-    /// the lanes in which rounding may have had a say, where points have been summed to `total`.
+    /// The windows of the blocks whose middle is row `y`; returns whether some wait for another layer.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`; the rings hold what the windows need.
+    /// As [`EvenTile::compute`]; the rings hold what the windows need.
+    #[inline(always)]
+    unsafe fn row<S: Groups>(
+        &self,
+        rings: &Rings<MOMENTS>,
+        method: &CovarianceMatrix,
+        run: &mut Run<Matrices>,
+        y: usize,
+        error: f64,
+    ) -> bool {
+        let &Cloud { width, .. } = self.even.cloud;
+        let Tile { columns, step, .. } = &self.blocks;
+        let points = rings.around(y);
+        let is_later = !rings.layer.is_first;
+        let mut some_wait = false;
+        for start in columns.clone().step_by(RUN * step) {
+            run.start = start;
+            run.lanes = [0; RUN / LANES];
+            let end = columns.end.min(start + RUN * step);
+            for (group, x) in (start..end).step_by(GROUP * step).enumerate() {
+                let block = self.even.asked.blocks.block(y * width + x);
+                let blocks = block..block + (end - x).div_ceil(*step).min(GROUP);
+                let pixels = Pixels { x: x + MIDDLE, step: *step, width };
+                // SAFETY: as the caller's.
+                unsafe {
+                    let windows = self.even.windows.part(blocks);
+                    let mut asked = (1 << windows.len()) - 1;
+                    if is_later {
+                        let waits = |lane: &usize| windows[*lane].radius == WAITS;
+                        asked = Bits(asked).filter(waits).fold(0, |all, lane| all | 1 << lane);
+                    }
+                    if asked == 0 {
+                        continue;
+                    }
+                    let eight = Eight { pixels, block, asked, error };
+                    let (found, hidden) =
+                        self.eight::<S>(rings, method, &eight, windows, run, group);
+                    some_wait |= hidden != 0;
+                    if self.even.of_blocks.is_some() && found != 0 {
+                        let at = group * GROUP;
+                        run.lanes[at / LANES] |= found << (at % LANES);
+                        let own = points.at(rings.place(pixels.x));
+                        let own = [own.apart(0, *step), own.apart(1, *step), own.apart(2, *step)];
+                        run.points.store::<S>(at, own);
+                    }
+                }
+            }
+            if let Some(sink) = &self.even.of_blocks {
+                // SAFETY: as the caller's.
+                unsafe {
+                    let first = y - y % BLOCK;
+                    self.blocks
+                        .finish::<S, CovarianceMatrix, MOMENTS>(sink, run, first, error, is_later);
+                }
+            }
+        }
+        some_wait
+    }
+
+    /// Finds the windows of eight blocks, and notes what their normals are made from, as the `group` of a run; returns the
+    /// lanes that have one, and those that wait for another layer.
+    ///
+    /// # Safety
+    /// As [`EvenTile::row`].
     #[inline(always)]
     unsafe fn eight<S: Groups>(
         &self,
         rings: &Rings<MOMENTS>,
-        moments: &CovarianceMatrix,
-        total: &[f64; MOMENTS],
-        pixel: (usize, usize),
-        blocks: Range<usize>,
-    ) -> (Fits<S>, u32) {
-        let &Cloud { width, .. } = self.cloud;
-        let clean_radii = &self.asked.clean[pixel.1 * width..][..width];
+        method: &CovarianceMatrix,
+        eight: &Eight,
+        windows: &mut [EvenWindow],
+        run: &mut Run<Matrices>,
+        group: usize,
+    ) -> (u32, u32) {
+        let Even { cloud, asked: Asked { clean: clean_radii, wanted: wanted_radii, .. }, .. } =
+            self.even;
+        let &Eight { pixels, block, asked, .. } = eight;
+        let y = rings.aimed.y;
+        let hides_some = rings.layer.hides_some();
+        let clean_radii = &clean_radii[y * cloud.width..][..cloud.width];
         let [mut wanted, mut clean, mut largest] = [[0.0; GROUP]; 3];
-        for (lane, block) in blocks.enumerate() {
-            if self.needed[block] {
-                wanted[lane] = self.asked.wanted[block] as f32;
-                clean[lane] = clean_radii[(pixel.0 + lane * BLOCK).min(width - 1)].into();
-                largest[lane] = (self.asked.largest(block) as f32).min(clean[lane]);
-            }
+        for lane in Bits(asked) {
+            wanted[lane] = wanted_radii[block + lane] as f32;
+            clean[lane] = clean_radii[(pixels.x + lane * BLOCK).min(cloud.width - 1)].into();
+            largest[lane] = (self.even.asked.largest(block + lane) as f32).min(clean[lane]);
         }
         // SAFETY: as the caller's.
         unsafe {
-            let (wanted, clean) = (Floats::load(wanted.as_ptr()), Floats::load(clean.as_ptr()));
-            let mut found = Fits::<S>::none();
-            // On steep surfaces, windows with depth changes.
+            let [wanted, clean] =
+                [Floats::<S>::load(wanted.as_ptr()), Floats::load(clean.as_ptr())];
+            let largest = Floats::<S>::load(largest.as_ptr());
+            let (zero, one) = (Floats::<S>::splat(0.0), Floats::<S>::splat(1.0));
+            let least = Doubles::splat(f64::from(self.even.asked.least_noise));
             let smallest = Floats::splat(JAGGED_RADIUS as f32 - 1.0);
-            let mut radii = wanted;
-            let mut todo = clean.lt(radii) & smallest.lt(radii);
-            let (mut done, mut doubtful) = (0, 0);
-            while todo != 0 {
-                let (fits, there) = self.fits(rings, moments, pixel, radii, todo);
-                doubtful |= there & self.doubtful(rings, total, &fits);
-                let jagged = there & self.jagged(&fits, pixel, radii);
-                found.take(jagged, &fits);
-                done |= jagged;
-                radii.0 = S::truncate((radii * Floats::splat(7.0) / Floats::splat(10.0)).0);
-                todo &= !jagged & clean.lt(radii) & smallest.lt(radii);
-            }
-            // Windows without, and smaller ones while those are much more even.
-            radii = Floats::load(largest.as_ptr());
-            todo = Floats::splat(0.0).lt(radii) & !done;
-            let least = Doubles::splat(f64::from(self.asked.least_noise));
-            let mut is_first = true;
-            while todo != 0 {
-                let (fits, there) = self.fits(rings, moments, pixel, radii, todo);
-                todo = there;
-                doubtful |= there & self.doubtful(rings, total, &fits);
-                if !is_first {
-                    todo &= fits.noise.max(least).lt(found.unevenness);
+            // On steep surfaces, windows with depth changes; then, or else, windows without, and smaller ones while those
+            // are much more even.
+            let mut jagged = clean.lt(wanted) & smallest.lt(wanted);
+            let mut even = zero.lt(largest) & !jagged;
+            let mut radii = largest;
+            radii.take(S::mask(jagged), wanted);
+            let mut found = zero;
+            let mut unevenness = Doubles::<S>::splat(f64::INFINITY);
+            let (mut doubtful, mut hidden) = (0, 0);
+            loop {
+                let todo = jagged | even;
+                let is_last = todo == 0;
+                if is_last {
+                    let mut all = [0.0; GROUP];
+                    S::store(all.as_mut_ptr(), found.0);
+                    for lane in Bits(asked & doubtful & !hidden) {
+                        let window = even_window(cloud, self.even.asked, block + lane);
+                        windows[lane] = window.unwrap_or_default();
+                        all[lane] = windows[lane].radius;
+                    }
+                    for lane in Bits(asked & hidden) {
+                        windows[lane].radius = WAITS;
+                        all[lane] = 0.0;
+                    }
+                    run.radii[group * GROUP..][..GROUP].copy_from_slice(&all);
+                    radii = Floats::load(all.as_ptr());
                 }
-                found.take(todo, &fits);
-                todo &= Floats::splat(1.0).lt(radii);
-                radii.0 = S::truncate((radii * Floats::splat(0.5)).0);
-                is_first = false;
+                let lanes = if is_last { zero.lt(radii) } else { todo };
+                let rects = Rects::new(rings, &pixels, radii, lanes, None);
+                let sums = rects.sums(rings, 0);
+                let fits = self.fits(method, &sums, eight.error);
+                if is_last {
+                    write(&fits, radii, lanes, asked & !doubtful & !hidden, windows);
+                    CovarianceMatrix::note::<S>(
+                        &sums,
+                        &rects,
+                        rings,
+                        lanes,
+                        &mut run.sums,
+                        group * GROUP,
+                    );
+                    return (lanes, hidden);
+                }
+                doubtful |= fits.doubtful & todo;
+                if hides_some {
+                    hidden |= fits.hidden & todo;
+                }
+                let is_jagged = jagged & fits.there & self.jagged(&fits, &pixels, radii, y);
+                let is_better = even & fits.there & !unevenness.lt(fits.noise().max(least));
+                found.take(S::mask(is_jagged | is_better), radii);
+                unevenness.0 = S::select_bits_d(is_better, fits.unevenness.0, unevenness.0);
+                let seven_tenths = radii * Floats::splat(7.0) / Floats::splat(10.0);
+                let next = Floats(S::truncate(seven_tenths.0));
+                let half = Floats(S::truncate((radii * Floats::splat(0.5)).0));
+                even = is_better & one.lt(radii);
+                let tried = jagged & !is_jagged;
+                jagged = tried & clean.lt(next) & smallest.lt(next);
+                let starts = tried & !jagged & zero.lt(largest);
+                radii.take(S::mask(even), half);
+                radii.take(S::mask(jagged), next);
+                radii.take(S::mask(starts), largest);
+                even |= starts;
             }
-            (found, doubtful)
         }
     }
 
-    /// The lanes whose planes are not those of all points, or that rounding may have a say in, where points have been
-    /// summed to `total`. Sums of positions are whole numbers, and exact.
+    /// Planes through the points of eight windows, as [`Plane::of`], from their sums, the errors of which stay below `error`.
     ///
     /// # Safety
-    /// As [`EvenTile::eight`]'s.
-    #[inline(always)]
-    unsafe fn doubtful<S: Groups>(
-        &self,
-        rings: &Rings<MOMENTS>,
-        total: &[f64; MOMENTS],
-        fits: &Fits<S>,
-    ) -> u32 {
-        let [xx, yy, rr] = [total[4], total[5], total[6]];
-        let [a, b] = fits.slope;
-        // SAFETY: as the caller's.
-        unsafe {
-            let splat = |value| Doubles::<S>::splat(value);
-            // More than (|r| + |a x| + |b y|)^2.
-            let summed = splat(3.0) * (splat(rr) + a * a * splat(xx) + b * b * splat(yy));
-            let least = splat(self.asked.least_noise.into()).max(fits.unevenness);
-            let allowed = splat(DOUBT) * least * (fits.points - splat(3.0));
-            let hides_some = rings.nearest_hidden < f32::INFINITY;
-            let hidden = if hides_some { with_fraction(fits.points) } else { 0 };
-            hidden | !(splat(ROUNDING) * summed).lt(allowed)
-        }
-    }
-
-    /// Planes through the points of eight windows, and the lanes that have one.
-    ///
-    /// # Safety
-    /// As [`EvenTile::eight`]'s.
+    /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn fits<S: Groups>(
         &self,
-        rings: &Rings<MOMENTS>,
-        moments: &CovarianceMatrix,
-        (x, y): (usize, usize),
-        radii: Floats<S>,
-        lanes: u32,
-    ) -> (Fits<S>, u32) {
-        let pixels = Pixels { x, step: BLOCK, width: self.cloud.width };
+        method: &CovarianceMatrix,
+        sums: &[Doubles<S>; MOMENTS],
+        error: f64,
+    ) -> Fits<S> {
+        let [sx, sy, sz, n, xx, yy, zz, xy, yz, xz] = *sums;
         // SAFETY: as the caller's.
         unsafe {
-            let rects = Rects::new(rings, &pixels, radii, lanes, None);
-            let [sx, sy, sr, n, xx, yy, rr, xy, yr, xr] = rects.sums(rings, 0);
             let share = Doubles::splat(1.0) / n;
-            let (mx, my, mr) = (sx * share, sy * share, sr * share);
-            let (xx, xy, yy) = (xx - sx * mx, xy - sx * my, yy - sy * my);
-            let (xr, yr, rr) = (xr - sx * mr, yr - sy * mr, rr - sr * mr);
-            let determinant = xx * yy - xy * xy;
-            let there = Doubles::splat(Plane::FEWEST - 0.5).lt(n)
-                & (Doubles::splat(Plane::LINE) * xx * yy).lt(determinant)
-                & lanes;
-            let scale = Doubles::splat(1.0) / determinant;
-            let slope = [(xr * yy - yr * xy) * scale, (yr * xx - xr * xy) * scale];
-            let deviation = rr - slope[0] * xr - slope[1] * yr;
-            let unevenness = deviation.max(Doubles::splat(0.0)) / (n - Doubles::splat(3.0));
-            let chance = Floats::splat(2.0) / (n.narrow() - Floats::splat(3.0));
-            let chance = Floats::splat(1.0) + Floats::splat(CHANCE) * chance.sqrt();
-            let noise = unevenness * chance.widen();
-            // The pixels' own positions.
-            let column = pixels.columns().widen();
-            let [origin_x, origin_y, origin_r] = moments.origin.map(|o| Doubles::splat(o));
-            let across = column - origin_x - mx;
-            let down = Doubles::splat(y as f64) - origin_y - my;
-            let inverse_depth = origin_r + mr + slope[0] * across + slope[1] * down;
-            (
-                Fits { radii: radii.widen(), inverse_depth, slope, points: n, unevenness, noise },
-                there,
-            )
+            let (x, y, z) = (sx * share, sy * share, sz * share);
+            let (xx, yy, zz) = (xx * share - x * x, yy * share - y * y, zz * share - z * z);
+            let (xy, yz, xz) = (xy * share - x * y, yz * share - y * z, xz * share - x * z);
+            let mut m = [x, y, z];
+            for c in 0..3 {
+                m[c] = m[c] + Doubles::splat(method.origin[c]);
+            }
+            let [axx, axy, axz] = [yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy];
+            let [ayy, ayz, azz] = [xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy];
+            let across = times([axx, axy, axz, ayy, ayz, azz], m);
+            let along = times([xx, xy, xz, yy, yz, zz], m);
+            let (spread, length2, along) = (dot(m, across), dot(m, m), dot(m, along));
+            let half_trace = ((xx + yy + zz) * length2 - along) * Doubles::splat(0.5);
+            let (seen, line) =
+                (spread * length2, Doubles::splat(Plane::LINE) * half_trace * half_trace);
+            let enough = Doubles::splat(Plane::FEWEST - 0.5).lt(n);
+            let determinant = (xx * axx + xy * axy + xz * axz).max(Doubles::splat(0.0));
+            let scale = Doubles::splat(1.0) / (spread + determinant);
+            let q = [across[0] * scale, across[1] * scale, across[2] * scale];
+            let (q2, below) = (dot(q, q), n - Doubles::splat(3.0));
+            let deviation2 = determinant * scale * n / below;
+            let (depth, slope2) = if self.even.cloud.has_range {
+                let along = dot(q, m);
+                (length2.sqrt(), q2 - along * along / length2)
+            } else {
+                (m[2], q[0] * q[0] + q[1] * q[1])
+            };
+            let depth2 = depth * depth;
+            let spread2 = spread / (depth2 * depth2 * depth2);
+            let angle2 = Doubles::splat(12.0) / (n - Doubles::splat(1.0)) * spread2.sqrt();
+            let mut unevenness = deviation2 / depth2;
+            // What the errors do to the sum of (1 - q P)^2, and to what tells lines and depths.
+            let least = Doubles::splat(self.even.asked.least_noise.into()).max(unevenness);
+            let allowed = Doubles::splat(DOUBT) * least * below * depth2;
+            let of_trace = Doubles::splat(8.0 * error) * share * length2;
+            let of_seen = of_trace * half_trace.max(of_trace);
+            let enough_seen = Doubles::splat(8.0) * of_seen;
+            let deep = Doubles::splat(Plane::DEEP) * length2 * length2;
+            let is_deep = deep.lt(along);
+            let mut steepness_squared = slope2 * angle2;
+            unevenness.0 = S::select_bits_d(is_deep, S::splat_d(f64::INFINITY), unevenness.0);
+            steepness_squared.0 = S::select_bits_d(is_deep, S::splat_d(0.0), steepness_squared.0);
+            let rounded = !((along + of_trace).lt(deep) | (deep + of_trace).lt(along))
+                | !is_deep & !(Doubles::splat(2.0 * error) * q2).lt(allowed)
+                | !is_deep & !((seen + of_seen).lt(line) | (line + enough_seen).lt(seen));
+            let by_depth = Doubles::splat(1.0) / depth;
+            Fits {
+                q,
+                ray: [m[0] * by_depth, m[1] * by_depth, m[2] * by_depth],
+                points: n,
+                unevenness,
+                steepness_squared,
+                there: enough & (is_deep | line.lt(seen)),
+                doubtful: enough & rounded,
+                hidden: with_fraction(n),
+            }
         }
     }
 
     /// The lanes whose points are in their plane but for the sensor's noise along rows and columns.
     ///
     /// # Safety
-    /// As [`EvenTile::eight`]'s.
+    /// As [`EvenTile::row`].
     #[inline(always)]
     unsafe fn jagged<S: Groups>(
         &self,
         fits: &Fits<S>,
-        (x, y): (usize, usize),
+        pixels: &Pixels,
         radii: Floats<S>,
+        y: usize,
     ) -> u32 {
-        let [a, b] = fits.slope;
         // SAFETY: as the caller's.
         unsafe {
-            let &Cloud { width, height, .. } = self.cloud;
-            let columns = Pixels { x, step: BLOCK, width }.columns();
-            let area = side(columns, radii, width) * side(Floats::splat(y as f32), radii, height);
-            let steep = Doubles::splat(JAGGED * JAGGED) * (a * a + b * b);
+            let &Cloud { width, height, .. } = self.even.cloud;
+            let row = Floats::splat(y as f32);
+            let area = side(pixels.columns(), radii, width) * side(row, radii, height);
+            let steep = Doubles::splat(JAGGED * JAGGED) * fits.steepness_squared;
             let fewest = Doubles::splat(JAGGED_POINTS) * area.widen();
-            let least = Doubles::splat(self.asked.least_noise.into());
+            let least = Doubles::splat(self.even.asked.least_noise.into());
             !steep.lt(fits.unevenness) & !steep.lt(least) & !fits.points.lt(fewest)
         }
     }
+}
+
+/// Writes the windows of the lanes that are there, and none for the others that are asked for.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn write<S: Groups>(
+    fits: &Fits<S>,
+    radii: Floats<S>,
+    there: u32,
+    asked: u32,
+    windows: &mut [EvenWindow],
+) {
+    let &Fits { q, ray, points, unevenness, steepness_squared, .. } = fits;
+    let mut fields = [[0.0; GROUP]; 11];
+    // SAFETY: as the caller's; the arrays hold so many lanes.
+    unsafe {
+        let steepness = steepness_squared.narrow().sqrt();
+        let noise = fits.noise();
+        let ([a, b, c], [x, y, z]) = (q, ray);
+        let values = [
+            radii,
+            a.narrow(),
+            b.narrow(),
+            c.narrow(),
+            x.narrow(),
+            y.narrow(),
+            z.narrow(),
+            steepness,
+            unevenness.narrow(),
+            noise.narrow(),
+            points.narrow(),
+        ];
+        for i in 0..values.len() {
+            S::store(fields[i].as_mut_ptr(), values[i].0);
+        }
+    }
+    for lane in Bits(asked) {
+        windows[lane] = EvenWindow::default();
+        if there >> lane & 1 == 1 {
+            let [radius, a, b, c, x, y, z, steepness, unevenness, noise, points] =
+                fields.each_ref().map(|field| field[lane]);
+            let (q, ray) = ([a, b, c], [x, y, z]);
+            let worth = EvenWindow::worth(radius as u32, points);
+            windows[lane] = EvenWindow { q, ray, steepness, unevenness, noise, ..worth };
+        }
+    }
+}
+
+/// A symmetric matrix, its upper triangle, times a vector.
+#[inline(always)]
+fn times<S: Groups>(
+    [xx, xy, xz, yy, yz, zz]: [Doubles<S>; 6],
+    [x, y, z]: [Doubles<S>; 3],
+) -> [Doubles<S>; 3] {
+    [xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z]
+}
+
+#[inline(always)]
+fn dot<S: Groups>(a: [Doubles<S>; 3], b: [Doubles<S>; 3]) -> Doubles<S> {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// How many columns or rows, of so many, windows around `at` have.

@@ -9,7 +9,7 @@ use crate::cloud::Points;
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::fast::buffer::Buffer;
 use crate::fast::lanes::LANES;
-use crate::paper::{BLOCK, inverse_depth};
+use crate::paper::BLOCK;
 use crate::simd::{Along, GROUP, Groups};
 
 /// x, y, z, and the weight: 1, or next to nothing for a hidden point (`layers`); 0 for a missing one, whose coordinates are
@@ -320,7 +320,7 @@ impl<const N: usize> Rings<N> {
         }
         self.end_row(y);
         if self.layer.hides_some() {
-            self.hide(y, |x| depths[x]);
+            self.hide(y, depths);
         }
     }
 
@@ -331,42 +331,19 @@ impl<const N: usize> Rings<N> {
         self.points[weights][end..].fill(0.0);
     }
 
-    /// Hides the points of row `y` whose depth, or what stands for it, by column, is not in the layer.
+    /// Hides the points of row `y` whose depths, by column, are not in the layer.
     #[cold]
-    fn hide(&mut self, y: usize, depth: impl Fn(usize) -> f32) {
+    fn hide(&mut self, y: usize, depths: &[f32]) {
         let hidden = self.layer.hidden();
         let planes: [_; 4] = std::array::from_fn(|field| self.plane(y, field).start);
         for x in self.columns.clone() {
-            let depth = depth(x).abs();
+            let depth = depths[x].abs();
             if depth > self.layer.deepest {
                 for (plane, value) in planes.iter().zip(hidden) {
                     self.points[plane + MARGIN + x - self.columns.start] = value;
                 }
                 self.nearest_hidden = self.nearest_hidden.min(depth);
             }
-        }
-    }
-
-    /// Reads row `y`, of which `depths` are the image's, as points: column, row and inverse depth.
-    #[inline(always)]
-    pub fn read_positions(&mut self, depths: &[f32], y: usize) {
-        let (start, stride) = (self.start_of_points(y), self.stride);
-        let Range { start: left, end } = self.columns;
-        let (xs, rest) = self.points[start..][..4 * stride].split_at_mut(stride);
-        let (ys, rest) = rest.split_at_mut(stride);
-        let (inverses, weights) = rest.split_at_mut(stride);
-        let fields = [xs, ys, inverses, weights].map(|plane| &mut plane[MARGIN..][..end - left]);
-        let [xs, ys, inverses, weights] = fields;
-        let mut largest = 0.0;
-        for (at, depth) in depths[left..end].iter().enumerate() {
-            let inverse = inverse_depth(*depth);
-            (xs[at], ys[at]) = ((left + at) as f32, y as f32);
-            (inverses[at], weights[at]) = (inverse, if inverse.is_nan() { 0.0 } else { 1.0 });
-            largest = if inverse.abs() > largest { inverse.abs() } else { largest };
-        }
-        self.end_row(y);
-        if largest > self.layer.deepest {
-            self.hide(y, |x| inverse_depth(depths[x]));
         }
     }
 

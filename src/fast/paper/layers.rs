@@ -55,13 +55,6 @@ impl Layer {
         Layer { deepest, is_first: false, ..Layer::default() }
     }
 
-    /// Of positions and inverse depths, about these: those of inverse depths up to `deepest`, where windows have radii of
-    /// up to this one.
-    pub fn of_positions(origin: [f32; 3], deepest: f32, radius: usize) -> Layer {
-        let deepest = if radius > LARGEST { f32::INFINITY } else { deepest };
-        Layer { deepest, origin, is_first: true }
-    }
-
     /// What stands for a hidden point.
     pub fn hidden(&self) -> Counted {
         let [x, y, z] = self.origin;

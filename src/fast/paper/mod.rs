@@ -18,7 +18,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use depths::row_length;
-use even_windows::EvenTile;
+use even_windows::{Even, EvenTile};
 use found::FoundRow;
 use integrals::{Rings, elements_of_rings, presence_of_rings, reached, rows_of_rings};
 use layers::{Layer, Waiting};
@@ -119,8 +119,13 @@ pub(crate) fn compute_with_radii(
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
     compute(isa, points, options, None, normals, scratch)?;
+    read_radii(points, radii, &scratch.paper)
+}
+
+/// Reads the radii of all pixels' windows, which have been found.
+fn read_radii(points: &Points, radii: &mut Vec<u32>, scratch: &Scratch) -> Result<(), Error> {
     let length = row_length(points.width());
-    let Scratch { chunks, radii: map, .. } = &scratch.paper;
+    let Scratch { chunks, radii: map, .. } = scratch;
     make_room(radii, points.width() * points.height())?;
     for place in chunks.iter().flat_map(|chunk| chunk.own.clone().map(|y| chunk.place(y))) {
         let row = &map[place * length..][..points.width()];
@@ -153,8 +158,8 @@ pub(crate) fn read_cloud(
     cloud: &mut Cloud,
     workers: &Workers,
 ) -> Result<(), Error> {
-    cloud.resize(points)?;
-    let range = Cloud::has_range(options);
+    cloud.resize(points, options)?;
+    let range = cloud.has_range;
     let width = points.width();
     let rows = cloud.points.chunks_mut(width).zip(cloud.depths.chunks_mut(width)).enumerate();
     workers.each(rows, |(y, (to, depths))| {
@@ -181,39 +186,39 @@ pub(crate) fn write_found(
     });
 }
 
-/// The even windows of the needed blocks, by the workers there are.
+/// What is found along with even windows.
+pub(crate) struct Along<'a> {
+    /// The normals of all pixels, if the radii of their windows are wanted as well, as [`compute_with_radii`] gives them; in
+    /// the paper's semantics.
+    pub pixels: &'a Normals<'a>,
+    pub radii: Option<&'a mut Vec<u32>>,
+    /// The normals of the even windows.
+    pub blocks: Option<&'a Normals<'a>>,
+}
+
+/// The even windows of all blocks, and normals by CM.
 pub(crate) fn even_windows(
     isa: Isa,
-    cloud: &Cloud,
-    asked: &Asked,
-    needed: &[bool],
+    points: &Points,
+    options: &Options,
+    (cloud, asked): (&Cloud, &Asked),
     windows: &mut Vec<EvenWindow>,
+    along: Along,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
-    let super::Scratch { workers, each, .. } = scratch;
-    let blocks = &asked.blocks;
-    resize(windows, blocks.count(), EvenWindow::default())?;
-    let parts = Parts(windows.as_mut_ptr());
-    let radius = |block: usize| {
-        let (x, y) = blocks.middle(block);
-        let clean = asked.clean[cloud.index(x, y)] as u32;
-        asked.largest(block).min(clean).max(asked.wanted[block])
-    };
-    let needed_blocks = (0..blocks.count()).filter(|block| needed[*block]);
-    let largest = needed_blocks.map(radius).max().unwrap_or(0) as usize;
-    let grid = Grid::new(cloud.width, cloud.height, largest, Rings::<MOMENTS>::COLUMN);
-    let room = grid.room(asked.limit, elements_of_rings);
-    for scratch in &each[..workers.count()] {
-        lock(scratch).paper.moments.reserve(room)?;
-    }
-    workers.for_each(grid.count(), |worker, item| {
-        let Some((columns, rows)) = grid.tile(item) else { return };
-        let tile = EvenTile { cloud, asked, needed, columns, rows, largest };
-        let rings = &mut lock(&each[worker]).paper.moments;
-        // SAFETY: the processor has the instruction set, and tiles do not share pixels.
-        unsafe { paths::run(isa, EvenTask { tile: &tile, rings, windows: &parts }) };
-    });
-    Ok(())
+    let Along { pixels, radii, blocks } = along;
+    let job = Job::new(isa, points, options, pixels);
+    job.depths(scratch)?;
+    let of_pixels = if radii.is_some() { job.radii(scratch)? } else { 0 };
+    resize(windows, asked.blocks.count(), EvenWindow::default())?;
+    let of_blocks = (0..windows.len()).map(|block| asked.largest(block));
+    let largest = of_pixels.max(of_blocks.max().unwrap_or(0) as usize);
+    let windows = Parts(windows.as_mut_ptr());
+    let (of_pixels, of_blocks) = (radii.is_some().then_some(pixels), blocks);
+    let [of_pixels, of_blocks] = [of_pixels, of_blocks].map(|normals| normals.map(Sink::All));
+    let even = Even { cloud, asked, windows, of_pixels, of_blocks };
+    job.even_tiles(scratch, &even, largest)?;
+    radii.map_or(Ok(()), |radii| read_radii(points, radii, &scratch.paper))
 }
 
 /// The block whose even window each pixel takes, where there is one; the others' choices stay.
@@ -246,6 +251,11 @@ impl Chunk {
     fn place(&self, y: usize) -> usize {
         self.start + y - self.swept.start
     }
+}
+
+/// Which of the map's rows one of the chunks' own rows is.
+fn place_of(chunks: &[Chunk], y: usize) -> usize {
+    chunks[y / chunks[0].own.len()].place(y)
 }
 
 /// The rows shared out to `count` sweeps. A depth change more than `reach` away decides no window, so each sweep can
@@ -428,8 +438,7 @@ impl<'a> Job<'a> {
         let sink = Sink::new(normals, indices, width, listed)?;
         let Scratch { depths, ranges, radii, chunks } = &*paper;
         let row = |y: usize| {
-            let row = y / step;
-            let at = chunks[row / chunks[0].own.len()].place(row) * radii_length;
+            let at = place_of(chunks, y / step) * radii_length;
             (&depths[y * length..][..length], &radii[at..at + radii_length])
         };
         let grid = Grid::new(width, height, largest, column(options.method));
@@ -450,29 +459,88 @@ impl<'a> Job<'a> {
         }
         workers.for_each(grid.count(), |worker, item| {
             let Some((columns, rows)) = grid.tile(item) else { return };
-            let ranges = &ranges[reached(&rows, largest, height)];
-            let depths = ranges.iter().fold([f32::INFINITY, 0.0], |[nearest, deepest], row| {
-                [row[0].min(nearest), row[1].max(deepest)]
-            });
             let tile = Tile { points, options, columns, rows, whole_points, largest, step, row };
             let scratch = &mut lock(&each[worker]).paper;
-            let span = span(options.method);
-            let mut next = Some(Layer::first(depths, span, largest));
-            while let Some(mut layer) = next {
-                layer.origin = tile.origin(&layer);
-                let (tile, layer, sink) = (&tile, &layer, &sink);
+            each_layer(&tile, ranges, span(options.method), |layer| {
+                let (tile, sink) = (&tile, &sink);
                 // SAFETY: the processor has the instruction set, and tiles do not share pixels.
-                let nearest = unsafe {
+                unsafe {
                     if layer.is_partial() {
                         paths::run(self.isa, TileTask::<_, true> { tile, layer, scratch, sink })
                     } else {
                         paths::run(self.isa, TileTask::<_, false> { tile, layer, scratch, sink })
                     }
-                };
-                next = nearest.map(|nearest| Layer::next([nearest, depths[1]], span));
-            }
+                }
+            });
         });
         Ok(())
+    }
+
+    /// The even windows, and normals by CM, tile by tile; no window's radius is above `largest`.
+    #[inline(never)]
+    fn even_tiles(
+        &self,
+        scratch: &mut super::Scratch,
+        even: &Even,
+        largest: usize,
+    ) -> Result<(), Error> {
+        let &Job { points, options, whole_points, .. } = self;
+        let super::Scratch { workers, each, paper, .. } = scratch;
+        let (width, height) = (points.width(), points.height());
+        let length = row_length(width);
+        let Scratch { depths, ranges, radii, chunks } = &*paper;
+        let row = |y: usize| {
+            let depths = &depths[y * length..][..length];
+            let radii = if even.of_pixels.is_some() {
+                let at = place_of(chunks, y) * length;
+                &radii[at..at + length]
+            } else {
+                &[]
+            };
+            (depths, radii)
+        };
+        let grid = Grid::new(width, height, largest, Rings::<MOMENTS>::COLUMN);
+        let room = grid.room(options.paper.largest_radius, elements_of_rings);
+        for scratch in &each[..workers.count()] {
+            let WorkerScratch { moments, waiting, .. } = &mut lock(scratch).paper;
+            waiting.reserve(width, grid.rows)?;
+            moments.reserve(room)?;
+        }
+        workers.for_each(grid.count(), |worker, item| {
+            let Some((columns, rows)) = grid.tile(item) else { return };
+            let tile = |step: usize| {
+                let (columns, rows) = (columns.clone(), rows.clone());
+                Tile { points, options, columns, rows, whole_points, largest, step, row }
+            };
+            let (pixels, blocks) = (tile(1), tile(BLOCK));
+            let tile = EvenTile { even, pixels, blocks };
+            let WorkerScratch { moments: rings, waiting, .. } = &mut lock(&each[worker]).paper;
+            each_layer(&tile.pixels, ranges, span(Method::CovarianceMatrix), |layer| {
+                let tile = &tile;
+                // SAFETY: the processor has the instruction set, and tiles do not share pixels.
+                unsafe { paths::run(self.isa, EvenTask { tile, layer, rings, waiting }) }
+            });
+        });
+        Ok(())
+    }
+}
+
+/// Has a tile computed layer by layer, of which `compute` returns how deep the nearest point is that pixels wait for.
+/// `ranges` has the rows' depths, of which the farthest in a layer is `span` times as deep as the nearest.
+fn each_layer<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])>(
+    tile: &Tile<'a, F>,
+    ranges: &[[f32; 2]],
+    span: f32,
+    mut compute: impl FnMut(&Layer) -> Option<f32>,
+) {
+    let ranges = &ranges[reached(&tile.rows, tile.largest, tile.points.height())];
+    let depths = ranges.iter().fold([f32::INFINITY, 0.0], |[nearest, deepest], row| {
+        [row[0].min(nearest), row[1].max(deepest)]
+    });
+    let mut next = Some(Layer::first(depths, span, tile.largest));
+    while let Some(mut layer) = next {
+        layer.origin = tile.origin(&layer);
+        next = compute(&layer).map(|nearest| Layer::next([nearest, depths[1]], span));
     }
 }
 
@@ -606,20 +674,25 @@ where
     }
 }
 
-/// The even windows of one tile; no one else writes its pixels.
-struct EvenTask<'a, 't> {
-    tile: &'t EvenTile<'a>,
+/// A layer of the even windows of one tile, as [`TileTask`].
+struct EvenTask<'a, 't, F> {
+    tile: &'t EvenTile<'a, F>,
+    layer: &'t Layer,
     rings: &'t mut Rings<MOMENTS>,
-    windows: &'t Parts<EvenWindow>,
+    waiting: &'t mut Waiting,
 }
 
-impl Task for EvenTask<'_, '_> {
-    type Output = ();
+impl<'a, F> Task for EvenTask<'a, '_, F>
+where
+    F: Fn(usize) -> (&'a [f32], &'a [f32]),
+{
+    type Output = Option<f32>;
 
     #[inline(always)]
-    unsafe fn run<S: Groups>(self) {
+    unsafe fn run<S: Groups>(self) -> Option<f32> {
+        let EvenTask { tile, layer, rings, waiting } = self;
         // SAFETY: as the caller's.
-        unsafe { self.tile.compute::<S>(self.rings, self.windows) };
+        unsafe { tile.compute::<S>(rings, layer, waiting) }
     }
 }
 

@@ -52,39 +52,80 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         waiting: &mut Waiting,
         sink: &Sink,
     ) -> Option<f32> {
+        // SAFETY: as the caller's.
+        let mut next = unsafe { self.start::<S, M, N>(rings, layer) };
+        self.start_waiting(layer, waiting);
+        let mut run = Run::default();
+        for y in self.rows.clone().step_by(self.step) {
+            // SAFETY: as the caller's.
+            unsafe {
+                let middle = middle(y, self.step, self.points.height());
+                let error = self.advance::<S, M, N>(method, rings, &mut next, middle);
+                self.row::<S, M, N, PARTIAL>(rings, waiting, sink, &mut run, y, error);
+            }
+        }
+        (layer.hides_some() && waiting.is_any()).then_some(rings.nearest_hidden)
+    }
+
+    /// Starts the rings over for a layer; returns the first row to be summed.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    pub unsafe fn start<S: Groups, M: Sums<N>, const N: usize>(
+        &self,
+        rings: &mut Rings<N>,
+        layer: &Layer,
+    ) -> usize {
         let (width, height) = (self.points.width(), self.points.height());
-        let reach = self.largest;
-        let columns = reached(&self.columns, reach, width);
-        let Range { start: top, end: bottom } = reached(&self.rows, reach, height);
-        let count = columns.len() * (bottom - top);
-        rings.start(columns, top, (reach, height), M::ENDS, layer);
-        if layer.is_first && layer.hides_some() {
+        let columns = reached(&self.columns, self.largest, width);
+        let top = reached(&self.rows, self.largest, height).start;
+        rings.start(columns, top, (self.largest, height), M::ENDS, layer);
+        // SAFETY: as the caller's.
+        unsafe { self.read::<S, M, N>(rings, top) };
+        top
+    }
+
+    /// Has no pixel wait, if the layer is the first.
+    #[inline(always)]
+    pub fn start_waiting(&self, layer: &Layer, waiting: &mut Waiting) {
+        if layer.is_first {
             let [columns, rows] =
                 [&self.columns, &self.rows].map(|all| all.len().div_ceil(self.step));
             waiting.start(columns, rows);
         }
-        let mut run = Run::default();
-        // SAFETY: as the caller's.
-        unsafe { self.read::<S, M, N>(rings, top) };
-        let mut next = top;
-        for y in self.rows.clone().step_by(self.step) {
-            while next < (middle(y, self.step, height) + reach + 1).min(bottom) {
-                if next + 1 < height {
-                    // SAFETY: as the caller's.
-                    unsafe { self.read::<S, M, N>(rings, next + 1) };
-                } else {
-                    rings.read_none(next + 1);
-                }
-                // SAFETY: as the caller's.
-                unsafe { rings.push::<S>(method, next) };
-                next += 1;
-            }
-            rings.aim(middle(y, self.step, height), height);
-            let error = M::error(rings.total(next - 1), count, rings.largest);
+    }
+
+    /// Sums the rows from `next` on that windows of row `y` reach, and aims at that row; returns what the sums' rounding
+    /// errors stay below.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    pub unsafe fn advance<S: Groups, M: Sums<N>, const N: usize>(
+        &self,
+        method: &M,
+        rings: &mut Rings<N>,
+        next: &mut usize,
+        y: usize,
+    ) -> f64 {
+        let (width, height) = (self.points.width(), self.points.height());
+        let columns = reached(&self.columns, self.largest, width);
+        let Range { start: top, end: bottom } = reached(&self.rows, self.largest, height);
+        while *next < (y + self.largest + 1).min(bottom) {
             // SAFETY: as the caller's.
-            unsafe { self.row::<S, M, N, PARTIAL>(rings, waiting, sink, &mut run, y, error) };
+            unsafe {
+                if *next + 1 < height {
+                    self.read::<S, M, N>(rings, *next + 1);
+                } else {
+                    rings.read_none(*next + 1);
+                }
+                rings.push::<S>(method, *next);
+            }
+            *next += 1;
         }
-        (layer.hides_some() && waiting.is_any()).then_some(rings.nearest_hidden)
+        rings.aim(y, height);
+        M::error(rings.total(*next - 1), columns.len() * (bottom - top), rings.largest)
     }
 
     /// Reads row `y` of the points.
@@ -102,21 +143,28 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         }
     }
 
-    /// A point of a layer: sums about it lose less.
+    /// A point of a layer, near the middle: sums about it lose less.
     pub fn origin(&self, layer: &Layer) -> [f32; 3] {
-        for y in self.rows.clone() {
-            let depths = &(self.row)(y).0[self.columns.clone()];
-            if let Some(at) = depths.iter().position(|depth| depth.abs() <= layer.deepest) {
-                return self.points.at(self.columns.start + at, y);
+        let from_middle = |range: &Range<usize>| {
+            let middle = range.start.midpoint(range.end);
+            (middle..range.end).chain((range.start..middle).rev())
+        };
+        for y in from_middle(&self.rows) {
+            let depths = (self.row)(y).0;
+            let is_in = |x: &usize| depths[*x].abs() <= layer.deepest;
+            if let Some(x) = from_middle(&self.columns).find(is_in) {
+                return self.points.at(x, y);
             }
         }
         [0.0; 3]
     }
 
+    /// The normals of the pixels of a row, which the rings are aimed at, as [`Tile::compute`].
+    ///
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn row<S: Groups, M: Sums<N>, const N: usize, const PARTIAL: bool>(
+    pub unsafe fn row<S: Groups, M: Sums<N>, const N: usize, const PARTIAL: bool>(
         &self,
         rings: &Rings<N>,
         waiting: &mut Waiting,
@@ -157,6 +205,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                     run.lanes[pair] |= windows << shift;
                     // Behind the last column radii mean nothing.
                     let eight = S::and(S::mask(windows), eight);
+                    S::store(run.radii[at..][..GROUP].as_mut_ptr(), eight);
                     let rects = {
                         let last = (step == 1).then_some(&mut rows);
                         Rects::new(rings, &pixels, Floats(eight), windows, last)
@@ -182,12 +231,13 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         }
     }
 
-    /// Writes the normals of a run in row `y`; in a later layer, only those of the pixels that waited for it.
+    /// Writes the normals of a run in row `y`, or in the blocks that start there; in a later layer, only those of the pixels
+    /// that waited for it.
     ///
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn finish<S: Groups, M: Sums<N>, const N: usize>(
+    pub unsafe fn finish<S: Groups, M: Sums<N>, const N: usize>(
         &self,
         sink: &Sink,
         run: &mut Run<M::OfRun>,
@@ -196,11 +246,10 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         is_later: bool,
     ) {
         let step = self.step;
-        let radii = (self.row)(y).1;
         let (width, height) = (self.points.width(), self.points.height());
         let cleaned =
             Cleaned { points: self.points, zero_is_missing: self.options.zero_is_missing };
-        let Run { start, sums, points, lanes } = run;
+        let Run { start, radii, sums, points, lanes } = run;
         let end = self.columns.end.min(*start + RUN * step);
         // SAFETY: as the caller's.
         unsafe {
@@ -216,9 +265,8 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 }
                 let pixel =
                     |lane: usize| (middle(x + lane * step, step, width), middle(y, step, height));
-                let rect = |lane: usize| {
-                    window(pixel(lane), radii[x / step + lane] as usize, width, height)
-                };
+                let rect =
+                    |lane: usize| window(pixel(lane), radii[at + lane] as usize, width, height);
                 let mut found = M::estimate::<S::Pair>(sums, at, error);
                 let mut plain = found.doubtful & windows;
                 if plain != 0 && M::afresh::<S>(&cleaned, rect, plain, sums, at) {
@@ -278,12 +326,19 @@ unsafe fn with_hidden<S: Groups, M: Sums<N>, const N: usize>(
 }
 
 /// Pixels of a row whose normals are found step by step, each step for all of them.
-#[derive(Default)]
-struct Run<T> {
+pub(super) struct Run<T> {
     /// The first one's column.
-    start: usize,
-    sums: T,
-    points: OfRun<f32, 3>,
+    pub start: usize,
+    pub radii: [f32; RUN],
+    pub sums: T,
+    pub points: OfRun<f32, 3>,
     /// The lanes of each pair of groups that have a window.
-    lanes: [u32; RUN / LANES],
+    pub lanes: [u32; RUN / LANES],
+}
+
+impl<T: Default> Default for Run<T> {
+    fn default() -> Self {
+        let (sums, points) = (T::default(), OfRun::default());
+        Run { start: 0, radii: [0.0; RUN], sums, points, lanes: [0; RUN / LANES] }
+    }
 }
