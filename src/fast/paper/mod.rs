@@ -34,7 +34,7 @@ use crate::Error;
 use crate::cloud::{Normals, PointRow, Points};
 use crate::isa::Isa;
 use crate::memory::{bytes, make_room, resize};
-use crate::options::{DistanceMetric, Method, Options};
+use crate::options::{DistanceMetric, Method, Options, Semantics};
 use crate::paper::{Asked, BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, PaperMaps, SecondPass};
 use crate::simd::{GROUP, Groups};
 use crate::threads::Workers;
@@ -134,7 +134,8 @@ fn read_radii(points: &Points, radii: &mut Vec<u32>, scratch: &Scratch) -> Resul
     Ok(())
 }
 
-/// The normals of the blocks whose middle pixel has a window of one of these radii; NaN for the others.
+/// The normals of the blocks whose middle pixel has a window of one of these radii; NaN for the others. The depths are those
+/// that [`even_windows`] has read.
 pub(crate) fn compute_of_blocks(
     isa: Isa,
     points: &Points,
@@ -144,7 +145,6 @@ pub(crate) fn compute_of_blocks(
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
     let job = Job::new(isa, points, options, normals);
-    job.depths(scratch)?;
     let largest = job.given_radii(scratch, radii)?;
     job.tiles(scratch, None, normals, largest, BLOCK)
 }
@@ -196,7 +196,8 @@ pub(crate) struct Along<'a> {
     pub blocks: Option<&'a Normals<'a>>,
 }
 
-/// The even windows of all blocks, and normals by CM.
+/// The even windows of all blocks, and normals by CM. In the paper's semantics without radii, the pixels' windows have been
+/// found already, by [`compute_with_radii`].
 pub(crate) fn even_windows(
     isa: Isa,
     points: &Points,
@@ -208,7 +209,9 @@ pub(crate) fn even_windows(
 ) -> Result<(), Error> {
     let Along { pixels, radii, blocks } = along;
     let job = Job::new(isa, points, options, pixels);
-    job.depths(scratch)?;
+    if radii.is_some() || options.semantics == Semantics::Pcl {
+        job.depths(scratch)?;
+    }
     let of_pixels = if radii.is_some() { job.radii(scratch)? } else { 0 };
     resize(windows, asked.blocks.count(), EvenWindow::default())?;
     let of_blocks = (0..windows.len()).map(|block| asked.largest(block));
