@@ -103,7 +103,9 @@ impl Scratch {
     /// So many workers, as far as there can be, and scratch memory for each.
     pub fn prepare(&mut self, threads: usize) -> Result<(), Error> {
         self.workers.prepare(threads)?;
-        self.each.resize_with(self.workers.count().max(self.each.len()), Mutex::default);
+        let more = self.workers.count().saturating_sub(self.each.len());
+        self.each.try_reserve_exact(more)?;
+        self.each.extend((0..more).map(|_| Mutex::default()));
         Ok(())
     }
 
