@@ -340,8 +340,12 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
             let angle2 = Doubles::splat(12.0) / (n - Doubles::splat(1.0)) * spread2.sqrt();
             let mut unevenness = deviation2 / depth2;
             // What the errors do to the sum of (1 - q P)^2, and to what tells lines and depths.
-            let least = Doubles::splat(self.even.asked.least_noise.into()).max(unevenness);
-            let allowed = Doubles::splat(DOUBT) * least * below * depth2;
+            let least = Doubles::splat(self.even.asked.least_noise.into());
+            let (of_deviation, scale) = (Doubles::splat(2.0 * error) * q2, below * depth2);
+            let allowed = Doubles::splat(DOUBT) * least.max(unevenness) * scale;
+            // Far below what is told from none, it makes no difference.
+            let largest = unevenness * scale + of_deviation;
+            let is_none = (Doubles::splat(4.0) * largest).lt(least * scale);
             let of_trace = Doubles::splat(8.0 * error) * share * length2;
             let of_seen = of_trace * half_trace.max(of_trace);
             let enough_seen = Doubles::splat(8.0) * of_seen;
@@ -351,7 +355,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
             unevenness.0 = S::select_bits_d(is_deep, S::splat_d(f64::INFINITY), unevenness.0);
             steepness_squared.0 = S::select_bits_d(is_deep, S::splat_d(0.0), steepness_squared.0);
             let rounded = !((along + of_trace).lt(deep) | (deep + of_trace).lt(along))
-                | !is_deep & !(Doubles::splat(2.0 * error) * q2).lt(allowed)
+                | !is_deep & !is_none & !of_deviation.lt(allowed)
                 | !is_deep & !((seen + of_seen).lt(line) | (line + enough_seen).lt(seen));
             let by_depth = Doubles::splat(1.0) / depth;
             Fits {
