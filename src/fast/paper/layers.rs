@@ -26,7 +26,7 @@ const LARGEST: usize = 63;
 /// The points of a tile up to a depth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Layer {
-    /// The largest magnitude of depth, or of what stands for it, of a point that is not hidden.
+    /// The largest magnitude of depth of a point that is not hidden.
     pub deepest: f32,
     /// Where sums are about, and where hidden points stand, which leaves nothing of them.
     pub origin: [f32; 3],
