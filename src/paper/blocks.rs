@@ -1,7 +1,7 @@
 //! Blocks of pixels, as the second pass looks at them: what is best for one pixel is next to best for its neighbours.
 
 /// Columns and rows of a block.
-pub(crate) const BLOCK: usize = 3;
+pub(crate) const BLOCK: usize = 4;
 
 /// Columns and rows before a block's middle pixel.
 pub(crate) const MIDDLE: usize = BLOCK / 2;

@@ -17,7 +17,7 @@ use crate::options::Options;
 pub(crate) const MISFIT: f32 = 3.0;
 /// What the squared distance of the points next to the pixel from the window's plane counts, where it is more than
 /// `NEAR_NOISE` variances of their mean.
-pub(crate) const NEAR: f32 = 9.0;
+pub(crate) const NEAR: f32 = 3.0;
 pub(crate) const NEAR_NOISE: f32 = 4.0;
 /// How many pixels beyond its window's edge a plane may be taken for a pixel's: outlines are ragged.
 pub(crate) const REACH: f32 = 4.0;
@@ -25,10 +25,12 @@ pub(crate) const REACH: f32 = 4.0;
 /// are two surfaces. The one beyond a crease is not taken if the pixel lies on this side of it, unless this side's
 /// costs `CREASE_COST` times as much.
 pub(crate) const CREASE_NOISE: f32 = 16.0;
-pub(crate) const CREASE_COST: f32 = 10.0;
+pub(crate) const CREASE_COST: f32 = 20.0;
 /// Windows whose costs differ by a smaller share than this one lacks are worth the same: which is the better one, on
 /// surfaces that are alike to both sides, is rounding. The first one is taken.
 pub(crate) const ALIKE: f32 = 0.999;
+/// A pixel and those next to it.
+pub(crate) const NEXT: f32 = 9.0;
 /// Depths are exact if more than this share of the windows that a pixel can take says so.
 pub(crate) const EXACT_SHARE: f32 = 0.25;
 
@@ -51,8 +53,13 @@ fn places(at: usize, radius: usize, count: usize) -> [usize; 3] {
 
 /// Those of the places around a block, 0 before it, 1 its own, 2 behind it. Of windows that are worth the same, the one
 /// at the middle of an edge is nearer.
-pub(crate) const PLACES: [(usize, usize); 8] =
+const PLACES: [(usize, usize); 8] =
     [(0, 1), (2, 1), (1, 0), (1, 2), (0, 0), (2, 0), (0, 2), (2, 2)];
+
+/// Those at the radius of a level. The small windows, which serve narrow surfaces, are at the middles of edges only.
+pub(crate) fn places_at(level: u8) -> &'static [(usize, usize)] {
+    if level < 2 { &PLACES } else { &PLACES[..4] }
+}
 
 /// The even windows, to choose from.
 pub(crate) struct EvenWindows<'a> {
@@ -80,13 +87,13 @@ impl EvenWindows<'_> {
         let Blocks { across, down, .. } = self.asked.blocks;
         let (x, y) = (block % across, block / across);
         visit(block);
-        let (largest, levels) = (self.asked.largest(block), u32::from(self.levels[block]));
-        let radii = (0..levels).map(|level| largest >> level);
-        for radius in radii.take_while(|radius| *radius > 0) {
+        let largest = self.asked.largest(block);
+        let radii = (0..self.levels[block]).map(|level| (level, largest >> level));
+        for (level, radius) in radii.take_while(|(_, radius)| *radius > 0) {
             let columns = places(x, radius as usize, across);
             let rows = places(y, radius as usize, down).map(|row| row * across);
-            for (column, row) in PLACES {
-                visit(rows[row] + columns[column]);
+            for (column, row) in places_at(level) {
+                visit(rows[*row] + columns[*column]);
             }
         }
     }
@@ -233,14 +240,13 @@ impl<'a> Candidates<'a> {
             return f32::INFINITY;
         };
         let [x, y] = pixel.way;
-        let astray = pixel.near.inverse_depth - inverse_depth_along(window.q, pixel.near.ray);
+        let plane = inverse_depth_along(window.q, pixel.ray);
+        let astray = pixel.near.inverse_depth - plane;
         let astray = (astray * astray - NEAR_NOISE * self.noise / pixel.near.points).max(0.0);
         let short = (length([x - dx, y - dy]) - window.radius).max(0.0);
         let cost = (even + astray * (NEAR * window.per_bend)) * (1.0 + short * short);
-        let lies_in = || {
-            let off = (pixel.inverse_depth - inverse_depth_along(window.q, pixel.ray)).abs();
-            off < pixel.tolerance + JITTER * window.steepness
-        };
+        let lies_in =
+            || (pixel.inverse_depth - plane).abs() < pixel.tolerance + JITTER * window.steepness;
         if short == 0.0 || lies_in() { cost } else { f32::INFINITY }
     }
 
@@ -269,33 +275,22 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// The mean of the pixel and those next to it, but of the pixel alone if there is a depth change among them or
-    /// depths are exact.
+    /// The mean of the pixel and those next to it, but of the pixel alone if one of them is missing, if there is a depth
+    /// change among them, or if depths are exact.
     fn near(&self, (x, y): (usize, usize)) -> Near {
         let EvenWindows { cloud, asked, .. } = self.even;
+        let inverse = |x: usize, y: usize| inverse_depth(cloud.depths[cloud.index(x, y)]);
+        let rect = Rect::around((x, y), 1, (cloud.width, cloud.height));
+        let of_column = |x: usize| rect.y.clone().map(|y| inverse(x, y)).sum::<f32>();
+        let mean = rect.x.clone().map(of_column).sum::<f32>() / NEXT;
         let is_clean = asked.clean[cloud.index(x, y)] > 0;
-        let reach = usize::from(is_clean && !self.is_exact);
-        let rect = Rect::around((x, y), reach, (cloud.width, cloud.height));
-        // Column by column.
-        let mut sums = [0.0; 5];
-        for x in rect.x {
-            let mut of_column = [0.0; 5];
-            for at in rect.y.clone().map(|y| cloud.index(x, y)) {
-                let inverse = inverse_depth(cloud.depths[at]);
-                if !inverse.is_nan() {
-                    let [x, y, z] = cloud.ray(at);
-                    add(&mut of_column, [inverse, x, y, z, 1.0]);
-                }
-            }
-            add(&mut sums, of_column);
+        let is_whole = rect.area() as f32 == NEXT && !mean.is_nan();
+        if is_whole && is_clean && !self.is_exact {
+            Near { inverse_depth: mean, points: NEXT }
+        } else {
+            Near { inverse_depth: inverse(x, y), points: 1.0 }
         }
-        let [inverse_depth, x, y, z] = [0, 1, 2, 3].map(|i| sums[i] / sums[4]);
-        Near { inverse_depth, ray: [x, y, z], points: sums[4] }
     }
-}
-
-fn add(sums: &mut [f32; 5], values: [f32; 5]) {
-    sums.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
 }
 
 /// How far a way leads along the rows or the columns, whichever is more.
@@ -330,9 +325,8 @@ struct Pixel {
     near: Near,
 }
 
-/// The means of points next to a pixel, and their number.
+/// The mean of points next to a pixel, and their number.
 struct Near {
     inverse_depth: f32,
-    ray: [f32; 3],
     points: f32,
 }

@@ -21,8 +21,8 @@ mod surroundings;
 
 pub(crate) use blocks::{BLOCK, Blocks, MIDDLE, middle};
 pub(crate) use choices::{
-    ALIKE, CREASE_COST, CREASE_NOISE, EXACT_SHARE, EvenWindows, MISFIT, NEAR, NEAR_NOISE,
-    NO_WINDOW, PLACES, REACH,
+    ALIKE, CREASE_COST, CREASE_NOISE, EXACT_SHARE, EvenWindows, MISFIT, NEAR, NEAR_NOISE, NEXT,
+    NO_WINDOW, REACH, places_at,
 };
 pub(crate) use cloud::{CleanPoints, Cleaned, Cloud};
 pub(crate) use even_windows::{

@@ -86,7 +86,7 @@ pub(crate) struct SecondPass {
 const EVERY_LEVEL: u8 = u32::BITS as u8;
 
 /// A crease does not bound the windows next to it as a depth change does: of the sizes that are tried, these many.
-const CREASE_LEVELS: u8 = 2;
+const CREASE_LEVELS: u8 = 3;
 
 impl SecondPass {
     /// Bytes held.
@@ -218,13 +218,13 @@ impl Concern<'_> {
         let middle = pixels[MIDDLE * BLOCK + MIDDLE];
         let with_window = || once(middle).chain(pixels).find(|at| has_window(*at));
         let normals_vary =
-            |at: usize| self.normals.vary_in(&window_of_size(cloud, options, at, sizes[at]));
+            |at: usize| self.normals.vary_in(&windows_of_block(cloud, options, at, sizes[at]));
         let is_near_crease = options.crease_windows && with_window().is_some_and(normals_vary);
         let mut level = 0;
         for at in pixels {
             let has_none = || estimates[at][0].is_nan() && !cloud.is_missing(at);
             if options.one_sided_windows
-                && (sizes[at] < wanted_size(cloud, options, at) || has_none())
+                && (sizes[at] < wanted_size(cloud.depths[at], options) || has_none())
             {
                 concerned[at - first] = true;
                 level = EVERY_LEVEL;
@@ -247,17 +247,21 @@ fn find_wanted(
 ) -> Result<(), Error> {
     refill(wanted, repeat_n(0, blocks.count()))?;
     let is_paper = options.semantics == Semantics::Paper;
-    workers.each(wanted.chunks_mut(blocks.across).enumerate(), |(row, wanted)| {
+    let rows = cloud.depths.chunks(BLOCK * cloud.width);
+    workers.each(wanted.chunks_mut(blocks.across).zip(rows), |(wanted, rows)| {
         for (column, wanted) in wanted.iter_mut().enumerate() {
             // Where the depth asks for most.
-            let pixels = blocks.pixels((column, row));
-            let most = pixels.into_iter().fold((pixels[0], f32::NEG_INFINITY), |most, at| {
-                let depth = cloud.depths[at];
-                let depth = if is_paper { depth.abs() } else { depth };
-                if depth > most.1 { (at, depth) } else { most }
-            });
-            let size = wanted_size(cloud, options, most.0);
-            *wanted = radius_of_size(size, options).min(options.paper.largest_radius);
+            let mut most = f32::NEG_INFINITY;
+            for row in rows.chunks(cloud.width) {
+                for depth in row[column * BLOCK..].iter().take(BLOCK) {
+                    let depth = if is_paper { depth.abs() } else { *depth };
+                    most = if depth > most { depth } else { most };
+                }
+            }
+            if most > f32::NEG_INFINITY {
+                let size = wanted_size(most, options);
+                *wanted = radius_of_size(size, options).min(options.paper.largest_radius);
+            }
         }
     });
     Ok(())
@@ -268,14 +272,12 @@ fn asks(options: &Options) -> bool {
     options.one_sided_windows || options.crease_windows
 }
 
-/// The size that the window of a pixel has far from any depth change, as [`Engine::windows`] gives them; 0 at a
-/// missing point.
-fn wanted_size(cloud: &Cloud, options: &Options, at: usize) -> u32 {
+/// The size that the window of a pixel of this depth has far from any depth change, as [`Engine::windows`] gives them; 0 for
+/// NaN.
+fn wanted_size(depth: f32, options: &Options) -> u32 {
     match options.semantics {
-        Semantics::Paper => smoothing_area::depth_radius(cloud.depths[at], &options.paper) as u32,
-        Semantics::Pcl => {
-            crate::smoothing_area::window_side(f32::INFINITY, cloud.points[at][2], options)
-        }
+        Semantics::Paper => smoothing_area::depth_radius(depth, &options.paper) as u32,
+        Semantics::Pcl => crate::smoothing_area::window_side(f32::INFINITY, depth, options),
     }
 }
 
@@ -287,12 +289,16 @@ fn radius_of_size(size: u32, options: &Options) -> u32 {
     }
 }
 
-/// The window of a size as [`Engine::windows`] gives them, without what lies outside the image.
-fn window_of_size(cloud: &Cloud, options: &Options, at: usize, size: u32) -> Rect {
+/// What the windows of the pixels next to one, as many as are in a block, cover of the image, if they have its size, as
+/// [`Engine::windows`] gives them.
+fn windows_of_block(cloud: &Cloud, options: &Options, at: usize, size: u32) -> Rect {
     let (width, height) = (cloud.width, cloud.height);
     let (pixel, size) = ((at % width, at / width), size as usize);
     match options.semantics {
-        Semantics::Paper => window(pixel, size, width, height),
-        Semantics::Pcl => rect_around(pixel, (size, size), (width, height)),
+        Semantics::Paper => window(pixel, size + MIDDLE, width, height),
+        Semantics::Pcl => {
+            let side = size + 2 * MIDDLE;
+            rect_around(pixel, (side, side), (width, height))
+        }
     }
 }

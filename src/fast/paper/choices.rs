@@ -14,7 +14,7 @@ use crate::memory::{bytes, make_room, refill, resize};
 use crate::options::{Options, Semantics};
 use crate::paper::{
     ALIKE, BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows,
-    JITTER, MIDDLE, MISFIT, NEAR, NEAR_NOISE, PLACES, REACH, inverse_depth,
+    JITTER, MIDDLE, MISFIT, NEAR, NEAR_NOISE, NEXT, REACH, inverse_depth, places_at,
 };
 use crate::simd::{Along, Groups, Simd, load_by_fours};
 
@@ -31,7 +31,8 @@ pub(super) unsafe fn rows<S: Groups>(
     let Blocks { across, .. } = even.asked.blocks;
     let Scratch { concerned, rows: image_rows, candidates } = scratch;
     // A block's own and those around it, for as many radii as the largest can be halved to.
-    let most = 1 + PLACES.len() * (1 + even.asked.limit.ilog2() as usize);
+    let levels = 0..=even.asked.limit.ilog2() as u8;
+    let most = 1 + levels.map(|level| places_at(level).len()).sum::<usize>();
     resize(candidates, most, Candidates::NONE)?;
     // SAFETY: as the caller's.
     let least_noise = unsafe { Floats::<S::Widest>::splat(even.asked.least_noise) };
@@ -174,7 +175,6 @@ struct Pixels<S: Simd> {
 #[derive(Clone, Copy)]
 struct Near<S: Simd> {
     inverse_depth: Floats<S>,
-    ray: [Floats<S>; 3],
     points: Floats<S>,
 }
 
@@ -244,18 +244,19 @@ impl<S: Simd> Windows<S> {
     #[inline(always)]
     unsafe fn cost(&self, pixels: &Pixels<S>, noise: Floats<S>) -> Floats<S> {
         let &Windows { middle: [dx, dy], radius, planes, per_bend, even, jitter, .. } = self;
-        let Near { inverse_depth, ray, points } = pixels.near;
+        let Near { inverse_depth, points } = pixels.near;
         // SAFETY: as the caller's.
         unsafe {
             let (zero, one) = (Floats::splat(0.0), Floats::splat(1.0));
-            let astray = inverse_depth - planes.at(ray);
+            let plane = planes.at(pixels.ray);
+            let astray = inverse_depth - plane;
             let near_noise = Floats::splat(NEAR_NOISE) * noise / points;
             let astray = (astray * astray - near_noise).max(zero);
             let [x, y] = pixels.at;
             let distance = (x - dx).abs().max((y - dy).abs());
             let short = (distance - radius).max(zero);
             let cost = (even + astray * (Floats::splat(NEAR) * per_bend)) * (one + short * short);
-            let off = (pixels.inverse_depth - planes.at(pixels.ray)).abs();
+            let off = (pixels.inverse_depth - plane).abs();
             let lies_in = S::lt(off.0, (pixels.tolerance + jitter).0);
             let is_beyond = S::and_not(lies_in, S::lt(zero.0, short.0));
             Floats(S::select(is_beyond, S::splat(f32::INFINITY), cost.0))
@@ -272,9 +273,8 @@ impl<S: Simd> Pixels<S> {
     unsafe fn none() -> Self {
         // SAFETY: as the caller's.
         let [number, there, inverse_depth, tolerance, points] = [unsafe { Floats::splat(0.0) }; 5];
-        let ray = [number; 3];
-        let near = Near { inverse_depth, ray, points };
-        Pixels { number, at: [number; 2], there, ray, inverse_depth, tolerance, near }
+        let near = Near { inverse_depth, points };
+        Pixels { number, at: [number; 2], there, ray: [number; 3], inverse_depth, tolerance, near }
     }
 
     /// Takes the others of a mask.
@@ -285,7 +285,6 @@ impl<S: Simd> Pixels<S> {
         }
         for i in 0..3 {
             self.ray[i].take(mask, other.ray[i]);
-            self.near.ray[i].take(mask, other.near.ray[i]);
         }
         self.number.take(mask, other.number);
         self.there.take(mask, other.there);
@@ -374,6 +373,23 @@ impl<S: Along> Found<'_, S> {
             self.there = self.there + Floats(one);
             self.exact = self.exact + Floats(S::and(is_exact, one));
         }
+    }
+
+    /// The blocks whose windows have these numbers, or any where there is none.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn places(&self, numbers: Floats<S>) -> [u32; LANES] {
+        let (mut of_lanes, mut places) = ([0; LANES], [0; LANES]);
+        // SAFETY: as the caller's; the array holds so many lanes.
+        unsafe { S::store_i(of_lanes.as_mut_ptr(), S::truncate_i(numbers.0)) };
+        for lane in 0..S::LANES {
+            if let Some(windows) = self.candidates.get(of_lanes[lane] as usize) {
+                places[lane] = windows.places[lane];
+            }
+        }
+        places
     }
 
     /// The mask of the blocks whose windows say that depths are exact.
@@ -481,7 +497,7 @@ impl Group<'_> {
             let zero = Floats::<S>::splat(0.0);
             let levels = levels.load::<S>();
             let mut radii = Floats::<S>(radii.load::<S>());
-            let mut level = 0.0;
+            let mut level = 0;
             let takes_any = S::lt(zero.0, levels);
             let column = Floats::<S>(column.load::<S>());
             let row = Floats::<S>::splat(row as f32);
@@ -490,7 +506,8 @@ impl Group<'_> {
             let own = [columns.lines::<S>(column, column), rows.lines(row, row)];
             found.add(even.windows, &own[0], &own[1], takes_any);
             loop {
-                let may_take = S::and(S::lt(zero.0, radii.0), S::lt(S::splat(level), levels));
+                let may_take =
+                    S::and(S::lt(zero.0, radii.0), S::lt(S::splat(level.into()), levels));
                 if S::bits(may_take) == 0 {
                     break;
                 }
@@ -502,11 +519,11 @@ impl Group<'_> {
                 let [above, below] = rows.around(row, distance);
                 let across = [&left, &own[0], &right];
                 let down = [&above, &own[1], &below];
-                for (column, row) in PLACES {
-                    found.add(even.windows, across[column], down[row], may_take);
+                for (column, row) in places_at(level) {
+                    found.add(even.windows, across[*column], down[*row], may_take);
                 }
                 radii = Floats(S::truncate((radii * Floats::splat(0.5)).0));
-                level += 1.0;
+                level += 1;
             }
         }
     }
@@ -546,6 +563,7 @@ impl Group<'_> {
             }
             let (second_best, second_windows) = found.best(&second);
             let crease = Crease::between(&first_windows, &second_windows, found.noise);
+            let taken = [found.places(first_best), found.places(second_best)];
             for ((number, own), first_cost) in pixels.iter().enumerate().zip(first_costs) {
                 let second_cost = second_windows.cost(own, found.noise);
                 let (alike, times) = (Floats::splat(ALIKE), Floats::splat(ALIKE * CREASE_COST));
@@ -561,15 +579,13 @@ impl Group<'_> {
                 let takes_second = S::or(S::and_not(to_first, is_better), to_second);
                 let takes_second = S::and_not(S::eq(own.number.0, first.number.0), takes_second);
                 let takes_second = S::or(takes_second, S::eq(own.number.0, second.number.0));
-                let best = S::select(takes_second, second_best.0, first_best.0);
                 let cost = S::select(takes_second, second_cost.0, first_cost.0);
                 let takes_some = S::bits(S::and(own.there.0, S::lt(cost, S::splat(f32::INFINITY))));
-                let mut numbers = [0; LANES];
-                S::store_i(numbers.as_mut_ptr(), S::truncate_i(best));
+                let takes_second = S::bits(takes_second);
                 let row = number / BLOCK * width + number % BLOCK;
                 for lane in Bits(takes_some) {
-                    let place = found.candidates[numbers[lane] as usize].places[lane];
-                    choices[row + self.blocks[lane] * BLOCK] = place;
+                    let place = taken[(takes_second >> lane & 1) as usize][lane];
+                    choices[row + columns[lane]] = place;
                 }
             }
         }
@@ -694,11 +710,9 @@ unsafe fn tolerance<S: Simd>(depth: S::F, options: &Options) -> Floats<S> {
 
 /// Rows of a block's pixels and those around it.
 const AROUND: usize = BLOCK + 2;
-/// Columns that are read of a block.
-const READ: usize = BLOCK.next_multiple_of(4);
 
-/// The inverse depths of points, and x, y and z of their rays; z only where depths are distances, else it is 1.
-const FIELDS: usize = 4;
+/// x, y and z of rays; z only where depths are distances, else it is 1.
+const AXES: usize = 3;
 
 /// The rows of the image around a row of blocks. In each there is a column before the image's, and room behind it for what
 /// is read of the last block.
@@ -707,39 +721,36 @@ struct Rows {
     /// Columns of the image, and elements of a row.
     width: usize,
     length: usize,
-    /// How many of the fields are read.
-    fields: usize,
-    /// `AROUND` rows of each; NaN outside the image.
-    points: [Vec<f32>; FIELDS],
-    /// `BLOCK` rows of each: the means of what is next to the pixels, as the plain form has them, and how many points that is.
-    near: [Vec<f32>; FIELDS],
-    near_points: Vec<f32>,
+    /// How many coordinates of the rays are read.
+    axes: usize,
+    /// `AROUND` rows; NaN outside the image.
+    inverse_depths: Vec<f32>,
+    /// `BLOCK` rows of each.
+    rays: [Vec<f32>; AXES],
+    /// `BLOCK` rows: the means of the pixels and those next to them, or NaN for pixels that count alone.
+    means: Vec<f32>,
     /// `BLOCK` rows; NaN for the pixels that are not concerned.
     depths: Vec<f32>,
-    /// A row of each: the sums over three rows of a column.
-    columns: [Vec<f32>; FIELDS],
-    column_points: Vec<f32>,
+    /// A row: the sums over three rows of a column.
+    columns: Vec<f32>,
 }
 
 impl Rows {
     /// Bytes held.
     fn size(&self) -> usize {
-        let Rows { points, near, near_points, depths, columns, column_points, .. } = self;
-        let fields = [points, near, columns].into_iter().flatten();
-        fields.chain([near_points, depths, column_points]).map(bytes).sum()
+        let Rows { inverse_depths, rays, means, depths, columns, .. } = self;
+        rays.iter().chain([inverse_depths, means, depths, columns]).map(bytes).sum()
     }
 
-    /// Has room for rows of an image of this width, and as many fields.
-    fn resize(&mut self, width: usize, fields: usize) -> Result<(), Error> {
+    /// Has room for rows of an image of this width.
+    fn resize(&mut self, width: usize, axes: usize) -> Result<(), Error> {
         let length = (1 + width).next_multiple_of(LANES) + LANES;
-        let Rows { points, near, near_points, depths, columns, column_points, .. } = self;
-        let of_around = points.iter_mut().zip([AROUND; FIELDS]);
-        let of_own = near.iter_mut().chain([near_points, depths]).zip([BLOCK; FIELDS + 2]);
-        let of_one = columns.iter_mut().chain([column_points]).zip([1; FIELDS + 1]);
-        for (rows, count) in of_around.chain(of_own).chain(of_one) {
+        let Rows { inverse_depths, rays, means, depths, columns, .. } = self;
+        let of_blocks = rays.iter_mut().chain([means, depths]).map(|rows| (rows, BLOCK));
+        for (rows, count) in of_blocks.chain([(inverse_depths, AROUND), (columns, 1)]) {
             refill(rows, repeat_n(f32::NAN, count * length))?;
         }
-        (self.width, self.length, self.fields) = (width, length, fields);
+        (self.width, self.length, self.axes) = (width, length, axes);
         Ok(())
     }
 
@@ -750,132 +761,108 @@ impl Rows {
     #[inline(always)]
     unsafe fn read<S: Along>(&mut self, even: &EvenWindows, row: usize) -> Result<(), Error> {
         let &EvenWindows { cloud, asked, concerned, .. } = even;
-        let fields = if cloud.has_range { FIELDS } else { FIELDS - 1 };
-        if (self.width, self.fields) != (cloud.width, fields) {
-            self.resize(cloud.width, fields)?;
+        let &Cloud { width, height, has_range, .. } = cloud;
+        let axes = if has_range { AXES } else { AXES - 1 };
+        if (self.width, self.axes) != (width, axes) {
+            self.resize(width, axes)?;
         }
         let length = self.length;
         for line in 0..AROUND {
             let y = (row * BLOCK + line).wrapping_sub(1);
-            if y < cloud.height {
+            let inverse_depths = &mut self.inverse_depths[line * length..][..length];
+            if y < height {
+                let depths = &cloud.depths[y * width..][..width];
                 // SAFETY: as the caller's.
-                unsafe { self.read_points::<S>(cloud, y, line * length + 1) };
+                unsafe { invert::<S>(depths, &mut inverse_depths[1..]) };
             } else {
-                self.points
-                    .iter_mut()
-                    .for_each(|rows| rows[line * length..][..length].fill(f32::NAN));
+                inverse_depths.fill(f32::NAN);
             }
         }
         for line in 0..BLOCK {
             let y = row * BLOCK + line;
-            if y >= cloud.height {
+            if y >= height {
                 self.depths[line * length..][..length].fill(f32::NAN);
                 continue;
             }
-            let pixels = y * cloud.width..(y + 1) * cloud.width;
+            let pixels = y * width..(y + 1) * width;
             let own = cloud.depths[pixels.clone()].iter().zip(&concerned[pixels.clone()]);
             for (to, (depth, concerned)) in self.depths[line * length + 1..].iter_mut().zip(own) {
                 *to = if *concerned { *depth } else { f32::NAN };
             }
             // SAFETY: as the caller's.
-            unsafe { self.find_near::<S>(line, &asked.clean[pixels]) };
+            unsafe {
+                self.find_rays::<S>(line, cloud, y);
+                self.find_means::<S>(line, &asked.clean[pixels]);
+            }
         }
         Ok(())
     }
 
-    /// Reads a row of points, for the elements of the fields from `first` on.
+    /// Finds the rays of a line of the blocks, row `y` of the image.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn read_points<S: Along>(&mut self, cloud: &Cloud, y: usize, first: usize) {
-        let fields = self.fields;
+    unsafe fn find_rays<S: Along>(&mut self, line: usize, cloud: &Cloud, y: usize) {
         let start = y * cloud.width;
         // Points are read by fours of floats: not the last ones of all.
         let readable = cloud.width.min(cloud.points.len() - start - 1);
         let whole = readable / S::LANES * S::LANES;
+        let inverse_depths = &self.inverse_depths[(line + 1) * self.length + 1..];
         for x in (0..whole).step_by(S::LANES) {
             let points = cloud.points[start + x..][..S::LANES].as_ptr().cast();
-            let depths = cloud.depths[start + x..][..S::LANES].as_ptr();
             // SAFETY: as the caller's; so many points are there, and so many elements.
             unsafe {
-                let inverse = S::div(S::splat(1.0), S::load(depths));
-                let inverse = S::select(S::finite(inverse), inverse, S::splat(f32::NAN));
-                let [px, py, pz] = S::load_points(points, size_of::<[f32; 3]>());
-                let rays = [inverse, S::mul(px, inverse), S::mul(py, inverse), S::mul(pz, inverse)];
-                for c in 0..fields {
-                    S::store(self.points[c][first + x..][..S::LANES].as_mut_ptr(), rays[c]);
+                let inverse = S::load(inverse_depths[x..][..S::LANES].as_ptr());
+                let point = S::load_points(points, size_of::<[f32; 3]>());
+                for axis in 0..self.axes {
+                    let to = &mut self.rays[axis][line * self.length + 1 + x..][..S::LANES];
+                    S::store(to.as_mut_ptr(), S::mul(point[axis], inverse));
                 }
             }
         }
         for x in whole..cloud.width {
-            let [px, py, pz] = cloud.ray(start + x);
-            let values = [inverse_depth(cloud.depths[start + x]), px, py, pz];
-            for c in 0..fields {
-                self.points[c][first + x] = values[c];
+            let ray = cloud.ray(start + x);
+            for axis in 0..self.axes {
+                self.rays[axis][line * self.length + 1 + x] = ray[axis];
             }
         }
     }
 
-    /// Finds what is next to the pixels of a line of the blocks, whose clean radii are these.
+    /// Finds the means around the pixels of a line of the blocks, whose clean radii are these.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn find_near<S: Along>(&mut self, line: usize, clean: &[i16]) {
-        let (fields, length) = (self.fields, self.length);
-        let row = |above: usize| (line + above) * length;
+    unsafe fn find_means<S: Along>(&mut self, line: usize, clean: &[i16]) {
+        let Rows { length, inverse_depths, columns, means, .. } = self;
+        let rows = [line, line + 1, line + 2].map(|row| &inverse_depths[row * *length..]);
         // SAFETY: as the caller's; rows have room for whole groups.
         unsafe {
-            let (zero, one) = (S::splat(0.0), S::splat(1.0));
-            for at in (0..length).step_by(S::LANES) {
-                let mut there = [zero; 3];
-                let mut points = zero;
-                for above in 0..3 {
-                    let inverse = S::load(self.points[0][row(above) + at..][..S::LANES].as_ptr());
-                    there[above] = S::eq(inverse, inverse);
-                    points = S::add(points, S::and(there[above], one));
-                }
-                S::store(self.column_points[at..][..S::LANES].as_mut_ptr(), points);
-                for c in 0..fields {
-                    let mut sum = zero;
-                    for above in 0..3 {
-                        let field = S::load(self.points[c][row(above) + at..][..S::LANES].as_ptr());
-                        sum = S::add(sum, S::and(there[above], field));
-                    }
-                    S::store(self.columns[c][at..][..S::LANES].as_mut_ptr(), sum);
-                }
+            for at in (0..*length).step_by(S::LANES) {
+                let [above, own, below] =
+                    [rows[0], rows[1], rows[2]].map(|row| row[at..][..S::LANES].as_ptr());
+                let sum = S::add(S::add(S::load(above), S::load(own)), S::load(below));
+                S::store(columns[at..][..S::LANES].as_mut_ptr(), sum);
             }
+            let means = &mut means[line * *length + 1..];
             for x in (0..clean.len()).step_by(S::LANES) {
                 let mut own_clean = Lanes::ZERO;
                 for (to, clean) in own_clean.0[..S::LANES].iter_mut().zip(&clean[x..]) {
                     *to = (*clean).into();
                 }
-                let alone = S::eq(own_clean.load::<S>(), zero);
-                let mut points = zero;
-                for left in 0..3 {
-                    let column = S::load(self.column_points[x + left..][..S::LANES].as_ptr());
-                    points = S::add(points, column);
-                }
-                let to = row(0) + 1 + x;
-                for c in 0..fields {
-                    let mut sum = zero;
-                    for left in 0..3 {
-                        sum =
-                            S::add(sum, S::load(self.columns[c][x + left..][..S::LANES].as_ptr()));
-                    }
-                    let own = S::load(self.points[c][row(1) + 1 + x..][..S::LANES].as_ptr());
-                    let mean = S::select(alone, own, S::div(sum, points));
-                    S::store(self.near[c][to..][..S::LANES].as_mut_ptr(), mean);
-                }
-                let points = S::select(alone, one, points);
-                S::store(self.near_points[to..][..S::LANES].as_mut_ptr(), points);
+                let is_clean = S::lt(S::splat(0.0), own_clean.load::<S>());
+                let [left, own, right] =
+                    [x, x + 1, x + 2].map(|column| columns[column..][..S::LANES].as_ptr());
+                let sum = S::add(S::add(S::load(left), S::load(own)), S::load(right));
+                let mean = S::select(is_clean, S::div(sum, S::splat(NEXT)), S::splat(f32::NAN));
+                S::store(means[x..][..S::LANES].as_mut_ptr(), mean);
             }
         }
     }
 
-    /// The pixels of a number in some blocks, at most as many as there are lanes, whose first columns are these: lanes
-    /// without one take no window. Around pixels of the mask `exact` nothing is next to them.
+    /// The pixels of some blocks, at most as many as there are lanes, whose first columns are these: lanes without one take
+    /// no window. Pixels of the mask `exact` count alone.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
@@ -887,57 +874,82 @@ impl Rows {
         exact: S::F,
         options: &Options,
     ) -> [Pixels<S>; BLOCK * BLOCK] {
-        let (fields, length) = (self.fields, self.length);
+        let last = columns.iter().max().expect("a lane");
+        assert!(last + 1 + BLOCK <= self.length);
         // SAFETY: as the caller's; the rows have so many elements from every column on.
         unsafe {
             let there = S::mask((1 << blocks) - 1);
             let (none, one) = (S::splat(f32::NAN), S::splat(1.0));
             let mut pixels = [Pixels::none(); BLOCK * BLOCK];
             for line in 0..BLOCK {
-                let first = line * length + 1;
-                let depths = columns_from::<S>(&self.depths[first..], columns);
-                let near_points = columns_from::<S>(&self.near_points[first..], columns);
-                let mut own = [[one; 4]; FIELDS];
-                let mut near = [[one; 4]; FIELDS];
-                for c in 0..fields {
-                    own[c] = columns_from::<S>(&self.points[c][first + length..], columns);
-                    near[c] = columns_from::<S>(&self.near[c][first..], columns);
+                let depths = self.four::<S>(&self.depths, line, columns);
+                let inverse_depths = self.four::<S>(&self.inverse_depths, line + 1, columns);
+                let means = self.four::<S>(&self.means, line, columns);
+                let mut rays = [[one; BLOCK]; AXES];
+                for axis in 0..self.axes {
+                    rays[axis] = self.four::<S>(&self.rays[axis], line, columns);
                 }
                 for column in 0..BLOCK {
                     let depth = S::select(there, depths[column], none);
-                    let mut of_near = [Floats(one); FIELDS];
-                    for c in 0..fields {
-                        of_near[c] = Floats(S::select(exact, own[c][column], near[c][column]));
-                    }
-                    let [inverse_depth, x, y, z] = of_near;
-                    let points = Floats(S::select(exact, one, near_points[column]));
+                    let (inverse_depth, mean) = (inverse_depths[column], means[column]);
+                    let has_mean = S::and_not(exact, S::eq(mean, mean));
+                    let near = Near {
+                        inverse_depth: Floats(S::select(has_mean, mean, inverse_depth)),
+                        points: Floats(S::select(has_mean, S::splat(NEXT), one)),
+                    };
                     let number = line * BLOCK + column;
-                    let own_ray = [own[1][column], own[2][column], own[3][column]];
                     pixels[number] = Pixels {
                         number: Floats::splat(number as f32),
                         at: [from_middle(column), from_middle(line)],
                         there: Floats(S::eq(depth, depth)),
-                        ray: [Floats(own_ray[0]), Floats(own_ray[1]), Floats(own_ray[2])],
-                        inverse_depth: Floats(own[0][column]),
+                        ray: [
+                            Floats(rays[0][column]),
+                            Floats(rays[1][column]),
+                            Floats(rays[2][column]),
+                        ],
+                        inverse_depth: Floats(inverse_depth),
                         tolerance: tolerance::<S>(depth, options),
-                        near: Near { inverse_depth, ray: [x, y, z], points },
+                        near,
                     };
                 }
             }
             pixels
         }
     }
+
+    /// The columns of a block's line of some of the rows, for each lane the block that starts with one of these.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`; the rows have so many elements from every column on.
+    #[inline(always)]
+    unsafe fn four<S: Along>(
+        &self,
+        rows: &[f32],
+        line: usize,
+        columns: &[usize; LANES],
+    ) -> [S::F; BLOCK] {
+        let row = rows[line * self.length..][..self.length].as_ptr();
+        // SAFETY: as the caller's.
+        unsafe { load_by_fours::<S>(|lane| row.add(1 + columns[lane])) }
+    }
 }
 
-/// Four columns of a row, from one on for each lane.
+/// One over the depths of a row, for as many elements from the first one on; NaN for a missing point.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn columns_from<S: Along>(row: &[f32], columns: &[usize; LANES]) -> [S::F; 4] {
-    for column in columns {
-        assert!(column + READ <= row.len());
+unsafe fn invert<S: Simd>(depths: &[f32], to: &mut [f32]) {
+    let whole = depths.len() / S::LANES * S::LANES;
+    for x in (0..whole).step_by(S::LANES) {
+        // SAFETY: as the caller's; so many elements are there.
+        unsafe {
+            let inverse = S::div(S::splat(1.0), S::load(depths[x..][..S::LANES].as_ptr()));
+            let inverse = S::select(S::finite(inverse), inverse, S::splat(f32::NAN));
+            S::store(to[x..][..S::LANES].as_mut_ptr(), inverse);
+        }
     }
-    // SAFETY: as the caller's; the row has so many elements.
-    unsafe { load_by_fours::<S>(|lane| row.as_ptr().add(columns[lane])) }
+    for x in whole..depths.len() {
+        to[x] = inverse_depth(depths[x]);
+    }
 }
