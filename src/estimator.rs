@@ -408,13 +408,13 @@ impl paper::Engine for Engine<'_> {
             }
             let plain = Plain::new(self.points, self.options)?;
             let side = |at: usize| plain.window_side(at % width, at / width);
-            refill(sizes, (0..width * height).map(side))?;
+            refill(sizes, (0..width * height).map(|at| side(at) as f32))?;
             return self.plain(pixels, estimates, |(x, y)| Some(plain.estimate(x, y)));
         }
         if self.is_plain {
             let maps = PaperMaps::new(self.points, self.options)?;
-            refill(sizes, maps.smoothing_radii.iter().map(|radius| *radius as u32))?;
-            let of_radius = |(x, y)| self.of_radius((x, y), sizes[y * width + x]);
+            refill(sizes, maps.smoothing_radii.iter().map(|radius| radius.trunc()))?;
+            let of_radius = |(x, y)| self.of_radius((x, y), sizes[y * width + x] as u32);
             return self.plain(pixels, estimates, of_radius);
         }
         self.written(size, estimates, |isa, points, options, normals, scratch| {

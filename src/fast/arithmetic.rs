@@ -121,6 +121,13 @@ impl<S: Simd> Doubles<S> {
         Doubles(unsafe { S::max_d(self.0, other.0) })
     }
 
+    /// Takes another's of some lanes.
+    #[inline(always)]
+    pub fn take(&mut self, lanes: u32, other: Self) {
+        // SAFETY: there is a group, so there is the instruction set.
+        self.0 = unsafe { S::select_bits_d(lanes, other.0, self.0) };
+    }
+
     /// Bit l is `self < other` in lane l.
     #[inline(always)]
     pub fn lt(self, other: Self) -> u32 {

@@ -195,19 +195,17 @@ pub(crate) fn compute_with_sides(
     points: &Points,
     options: &Options,
     normals: &Normals,
-    found: &mut Vec<u32>,
+    found: &mut Vec<f32>,
     scratch: &mut Scratch,
 ) -> Result<(), Error> {
     let width = points.width();
-    resize(found, width * points.height(), 0)?;
+    resize(found, width * points.height(), 0.0)?;
     let found = Parts(found.as_mut_ptr());
     let read = |rows: Range<usize>, sides: Sides| {
         for y in rows {
             // SAFETY: the row is in the image, and of one slice.
             let to = unsafe { found.part(y * width..(y + 1) * width) };
-            for (to, side) in to.iter_mut().zip(sides.row(y)) {
-                *to = *side as u32;
-            }
+            to.copy_from_slice(&sides.row(y)[..width]);
         }
     };
     compute_slices(isa, points, options, None, normals, read, scratch)

@@ -1,5 +1,6 @@
 //! The organized cloud with its depths; every way of being missing has become NaN.
 
+use super::blocks::BLOCK;
 use super::planes::inverse_depth;
 use super::rect::Rect;
 use crate::Error;
@@ -15,6 +16,7 @@ pub(crate) struct Cloud {
     pub height: usize,
     /// Whether depths are distances from the origin, not z.
     pub has_range: bool,
+    /// With some behind the last one, so that there are whole blocks of them.
     pub points: Vec<[f32; 3]>,
     pub depths: Vec<f32>,
 }
@@ -47,7 +49,7 @@ impl Cloud {
         (self.width, self.height) = (points.width(), points.height());
         let is_paper = options.semantics == Semantics::Paper;
         self.has_range = is_paper && options.paper.depth == Depth::Range;
-        resize(&mut self.points, self.width * self.height, [f32::NAN; 3])?;
+        resize(&mut self.points, self.width * self.height + BLOCK - 1, [f32::NAN; 3])?;
         resize(&mut self.depths, self.width * self.height, f32::NAN)
     }
 

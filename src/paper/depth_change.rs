@@ -62,15 +62,17 @@ impl DepthChanges {
             for (axis, (changes, behind)) in [right, below].into_iter().zip(behind).enumerate() {
                 let pairs = depths[row..next].iter().zip(&depths[behind.clone()]);
                 for (to, (before, depth)) in changes.iter_mut().zip(pairs.clone()) {
-                    *to = is_change(*before, depth - before, 1);
+                    *to = before.is_nan() & !depth.is_nan();
                 }
-                for ((to, at), (before, depth)) in changes.iter_mut().zip(behind).zip(pairs) {
-                    if before.is_nan() & !depth.is_nan() {
-                        *to = cloud.gap(at, axis).is_some_and(|gap| {
-                            let before = depths[at - gap * [1, width][axis]];
-                            is_change(before, depth - before, gap)
-                        });
-                    }
+                for_each_mark(changes, |x, to| {
+                    let at = behind.start + x;
+                    *to = cloud.gap(at, axis).is_some_and(|gap| {
+                        let before = depths[at - gap * [1, width][axis]];
+                        is_change(before, depths[at] - before, gap)
+                    });
+                });
+                for (to, (before, depth)) in changes.iter_mut().zip(pairs) {
+                    *to |= is_change(*before, depth - before, 1);
                 }
             }
         });
@@ -125,7 +127,7 @@ impl DepthChanges {
         };
         for (axis, changes) in [&mut self.right, &mut self.below].into_iter().enumerate() {
             workers.each(changes.chunks_mut(width).enumerate(), |(y, row)| {
-                for_each_change(row, |x, change| *change = !is_explained(axis, y * width + x));
+                for_each_mark(row, |x, change| *change = !is_explained(axis, y * width + x));
             });
         }
     }
@@ -143,8 +145,8 @@ impl DepthChanges {
         let around = |at: usize, size: usize| at.saturating_sub(1)..(at + 2).min(size);
         let rows = right.chunks_mut(width).zip(below.chunks_mut(width)).enumerate();
         for (y, (right, below)) in rows {
-            for_each_change(right, |x, _| spoil(x..x + 2, around(y, height)));
-            for_each_change(below, |x, _| spoil(around(x, width), y..y + 2));
+            for_each_mark(right, |x, _| spoil(x..x + 2, around(y, height)));
+            for_each_mark(below, |x, _| spoil(around(x, width), y..y + 2));
         }
         // The chessboard distance.
         least_steps(clean_radii, spoilt, (width, height), LARGEST_CLEAN, 1, 1)?;
@@ -156,24 +158,24 @@ impl DepthChanges {
 fn inverse_range(cloud: &Cloud, rect: &Rect) -> f32 {
     let rows = rect.y.clone().map(|y| &cloud.depths[y * cloud.width..][rect.x.clone()]);
     let (mut least, mut largest) = (f32::INFINITY, f32::NEG_INFINITY);
-    for depth in rows.flatten() {
-        least = depth.min(least);
-        largest = depth.max(largest);
+    for &depth in rows.flatten() {
+        least = if depth < least { depth } else { least };
+        largest = if depth > largest { depth } else { largest };
     }
     (inverse_depth(least) - inverse_depth(largest)).abs()
 }
 
-/// Calls `visit` with the columns of a row's changes, and these. They are few: most of the row is looked at by sixteens.
-fn for_each_change(row: &mut [bool], mut visit: impl FnMut(usize, &mut bool)) {
+/// Calls `visit` with the columns of a row that are marked, and the marks. They are few: most of the row is looked at by sixteens.
+fn for_each_mark(row: &mut [bool], mut visit: impl FnMut(usize, &mut bool)) {
     const TOGETHER: usize = 16;
     let (all, rest) = row.as_chunks_mut::<TOGETHER>();
     let start_of_rest = all.len() * TOGETHER;
     let all = all.iter_mut().map(|some| some.as_mut_slice());
     let parts = all.zip((0..).step_by(TOGETHER)).chain([(rest, start_of_rest)]);
     for (part, first) in parts {
-        if part.iter().fold(false, |any, change| any | change) {
-            let changes = part.iter_mut().zip(first..).filter(|(change, _)| **change);
-            changes.for_each(|(change, x)| visit(x, change));
+        if part.iter().fold(false, |any, mark| any | mark) {
+            let marks = part.iter_mut().zip(first..).filter(|(mark, _)| **mark);
+            marks.for_each(|(mark, x)| visit(x, mark));
         }
     }
 }

@@ -51,8 +51,8 @@ pub(crate) trait Engine {
 /// The windows, and what they give.
 #[derive(Debug, Default)]
 pub(crate) struct Windows {
-    /// Of the first pass, pixel by pixel: 0 for none, as a radius, or in PCL's semantics as a side.
-    pub sizes: Vec<u32>,
+    /// Of the first pass, pixel by pixel, whole numbers: 0 for none, as a radius, or in PCL's semantics as a side.
+    pub sizes: Vec<f32>,
     pub estimates: Vec<[f32; 4]>,
     /// Block by block.
     pub even: Vec<EvenWindow>,
@@ -199,41 +199,56 @@ struct Concern<'a> {
 }
 
 impl Concern<'_> {
-    /// Marks them, and the levels of their blocks.
+    /// Marks them, and the levels of their blocks; none is marked so far.
     fn find(&self, concerned: &mut [bool], levels: &mut [u8], workers: &Workers) {
-        let &Concern { cloud, blocks, .. } = self;
+        let &Concern { cloud, options, blocks, .. } = self;
         let rows = concerned.chunks_mut(BLOCK * cloud.width).enumerate();
         workers.each(rows.zip(levels.chunks_mut(blocks.across)), |((row, concerned), levels)| {
+            let first = row * BLOCK * cloud.width;
+            if options.one_sided_windows {
+                self.find_one_sided(concerned, first);
+            }
             for (column, level) in levels.iter_mut().enumerate() {
-                let pixels = blocks.pixels((column, row));
-                *level = self.level(pixels, row * BLOCK * cloud.width, concerned);
+                *level = self.level(blocks.pixels((column, row)), first, concerned);
             }
         });
     }
 
-    /// The level of a block; marks its pixels, of which `concerned` starts with number `first`.
+    /// Marks the pixels from `first` on whose windows are smaller than their depths ask for, or have no normal.
+    fn find_one_sided(&self, concerned: &mut [bool], first: usize) {
+        let &Concern { cloud, windows: Windows { sizes, estimates, .. }, .. } = self;
+        // The loop's own: it is vectorized.
+        let options = self.options.clone();
+        let found = sizes[first..].iter().zip(&estimates[first..]);
+        for ((to, depth), (size, [x, ..])) in
+            concerned.iter_mut().zip(&cloud.depths[first..]).zip(found)
+        {
+            // Sizes are whole numbers.
+            let is_short = size + 1.0 <= wanted_size(*depth, &options);
+            *to = is_short | (x.is_nan() & !depth.is_nan());
+        }
+    }
+
+    /// The level of a block; marks its pixels near creases. `concerned` starts with pixel number `first`.
     fn level(&self, pixels: [usize; BLOCK * BLOCK], first: usize, concerned: &mut [bool]) -> u8 {
-        let &Concern { cloud, options, windows: Windows { sizes, estimates, .. }, .. } = self;
-        let has_window = |at: usize| sizes[at] > 0;
-        let middle = pixels[MIDDLE * BLOCK + MIDDLE];
-        let with_window = || once(middle).chain(pixels).find(|at| has_window(*at));
+        let &Concern { cloud, options, windows: Windows { sizes, .. }, .. } = self;
+        let has_window = |at: &usize| sizes[*at] > 0.0;
+        let is_concerned = |at: &usize| concerned[at - first];
+        let is_one_sided = options.one_sided_windows && pixels.iter().any(is_concerned);
+        let level = if is_one_sided { EVERY_LEVEL } else { 0 };
+        let with_window = || {
+            let middle = pixels[MIDDLE * BLOCK + MIDDLE];
+            once(middle).chain(pixels).find(has_window)
+        };
         let normals_vary =
             |at: usize| self.normals.vary_in(&windows_of_block(cloud, options, at, sizes[at]));
-        let is_near_crease = options.crease_windows && with_window().is_some_and(normals_vary);
-        let mut level = 0;
-        for at in pixels {
-            let has_none = || estimates[at][0].is_nan() && !cloud.is_missing(at);
-            if options.one_sided_windows
-                && (sizes[at] < wanted_size(cloud.depths[at], options) || has_none())
-            {
-                concerned[at - first] = true;
-                level = EVERY_LEVEL;
-            } else if is_near_crease && has_window(at) {
-                concerned[at - first] = true;
-                level = CREASE_LEVELS.max(level);
-            }
+        if !(options.crease_windows && with_window().is_some_and(normals_vary)) {
+            return level;
         }
-        level
+        for at in pixels.into_iter().filter(has_window) {
+            concerned[at - first] = true;
+        }
+        CREASE_LEVELS.max(level)
     }
 }
 
@@ -272,26 +287,26 @@ fn asks(options: &Options) -> bool {
     options.one_sided_windows || options.crease_windows
 }
 
-/// The size that the window of a pixel of this depth has far from any depth change, as [`Engine::windows`] gives them; 0 for
-/// NaN.
-fn wanted_size(depth: f32, options: &Options) -> u32 {
+/// The size that the window of a pixel of this depth has far from any depth change, as [`Engine::windows`] gives them but for
+/// a fraction.
+fn wanted_size(depth: f32, options: &Options) -> f32 {
     match options.semantics {
-        Semantics::Paper => smoothing_area::depth_radius(depth, &options.paper) as u32,
-        Semantics::Pcl => crate::smoothing_area::window_side(f32::INFINITY, depth, options),
+        Semantics::Paper => smoothing_area::depth_radius(depth, &options.paper),
+        Semantics::Pcl => crate::smoothing_area::window_side(f32::INFINITY, depth, options) as f32,
     }
 }
 
 /// The radius of a window of a size as [`Engine::windows`] gives them.
-fn radius_of_size(size: u32, options: &Options) -> u32 {
+fn radius_of_size(size: f32, options: &Options) -> u32 {
     match options.semantics {
-        Semantics::Paper => size,
-        Semantics::Pcl => size / 2,
+        Semantics::Paper => size as u32,
+        Semantics::Pcl => size as u32 / 2,
     }
 }
 
 /// What the windows of the pixels next to one, as many as are in a block, cover of the image, if they have its size, as
 /// [`Engine::windows`] gives them.
-fn windows_of_block(cloud: &Cloud, options: &Options, at: usize, size: u32) -> Rect {
+fn windows_of_block(cloud: &Cloud, options: &Options, at: usize, size: f32) -> Rect {
     let (width, height) = (cloud.width, cloud.height);
     let (pixel, size) = ((at % width, at / width), size as usize);
     match options.semantics {

@@ -25,9 +25,6 @@ pub(crate) fn least_depth_change(depth: f32, options: &PaperOptions) -> f32 {
 
 /// The radius that the depth asks for, in pixels: B (Eq. 5), within the limits; NaN at a missing point.
 pub(crate) fn depth_radius(depth: f32, options: &PaperOptions) -> f32 {
-    if depth.is_nan() {
-        return f32::NAN;
-    }
     let radius = options.beta * smallest_depth_change(depth, options);
     radius.clamp(options.least_depth_radius as f32, options.largest_radius as f32)
 }

@@ -542,7 +542,7 @@ impl Group<'_> {
                 columns[lane] = self.blocks[lane] * BLOCK;
             }
             let (blocks, exact) = (self.blocks.len(), found.is_exact());
-            let pixels = rows.pixels(&columns, blocks, exact, self.even.options);
+            let pixels = rows.pixels(self.even, self.row, &columns, blocks, exact);
             let mut first = pixels[MIDDLE * BLOCK + MIDDLE];
             for other in &pixels {
                 first.take(S::and_not(first.there.0, other.there.0), other);
@@ -711,9 +711,6 @@ unsafe fn tolerance<S: Simd>(depth: S::F, options: &Options) -> Floats<S> {
 /// Rows of a block's pixels and those around it.
 const AROUND: usize = BLOCK + 2;
 
-/// x, y and z of rays; z only where depths are distances, else it is 1.
-const AXES: usize = 3;
-
 /// The rows of the image around a row of blocks. In each there is a column before the image's, and room behind it for what
 /// is read of the last block.
 #[derive(Debug, Default)]
@@ -721,12 +718,8 @@ struct Rows {
     /// Columns of the image, and elements of a row.
     width: usize,
     length: usize,
-    /// How many coordinates of the rays are read.
-    axes: usize,
     /// `AROUND` rows; NaN outside the image.
     inverse_depths: Vec<f32>,
-    /// `BLOCK` rows of each.
-    rays: [Vec<f32>; AXES],
     /// `BLOCK` rows: the means of the pixels and those next to them, or NaN for pixels that count alone.
     means: Vec<f32>,
     /// `BLOCK` rows; NaN for the pixels that are not concerned.
@@ -738,19 +731,20 @@ struct Rows {
 impl Rows {
     /// Bytes held.
     fn size(&self) -> usize {
-        let Rows { inverse_depths, rays, means, depths, columns, .. } = self;
-        rays.iter().chain([inverse_depths, means, depths, columns]).map(bytes).sum()
+        let Rows { inverse_depths, means, depths, columns, .. } = self;
+        [inverse_depths, means, depths, columns].map(bytes).iter().sum()
     }
 
     /// Has room for rows of an image of this width.
-    fn resize(&mut self, width: usize, axes: usize) -> Result<(), Error> {
+    fn resize(&mut self, width: usize) -> Result<(), Error> {
         let length = (1 + width).next_multiple_of(LANES) + LANES;
-        let Rows { inverse_depths, rays, means, depths, columns, .. } = self;
-        let of_blocks = rays.iter_mut().chain([means, depths]).map(|rows| (rows, BLOCK));
-        for (rows, count) in of_blocks.chain([(inverse_depths, AROUND), (columns, 1)]) {
+        let Rows { inverse_depths, means, depths, columns, .. } = self;
+        for (rows, count) in
+            [(inverse_depths, AROUND), (means, BLOCK), (depths, BLOCK), (columns, 1)]
+        {
             refill(rows, repeat_n(f32::NAN, count * length))?;
         }
-        (self.width, self.length, self.axes) = (width, length, axes);
+        (self.width, self.length) = (width, length);
         Ok(())
     }
 
@@ -761,10 +755,9 @@ impl Rows {
     #[inline(always)]
     unsafe fn read<S: Along>(&mut self, even: &EvenWindows, row: usize) -> Result<(), Error> {
         let &EvenWindows { cloud, asked, concerned, .. } = even;
-        let &Cloud { width, height, has_range, .. } = cloud;
-        let axes = if has_range { AXES } else { AXES - 1 };
-        if (self.width, self.axes) != (width, axes) {
-            self.resize(width, axes)?;
+        let &Cloud { width, height, .. } = cloud;
+        if self.width != width {
+            self.resize(width)?;
         }
         let length = self.length;
         for line in 0..AROUND {
@@ -790,43 +783,9 @@ impl Rows {
                 *to = if *concerned { *depth } else { f32::NAN };
             }
             // SAFETY: as the caller's.
-            unsafe {
-                self.find_rays::<S>(line, cloud, y);
-                self.find_means::<S>(line, &asked.clean[pixels]);
-            }
+            unsafe { self.find_means::<S>(line, &asked.clean[pixels]) };
         }
         Ok(())
-    }
-
-    /// Finds the rays of a line of the blocks, row `y` of the image.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    unsafe fn find_rays<S: Along>(&mut self, line: usize, cloud: &Cloud, y: usize) {
-        let start = y * cloud.width;
-        // Points are read by fours of floats: not the last ones of all.
-        let readable = cloud.width.min(cloud.points.len() - start - 1);
-        let whole = readable / S::LANES * S::LANES;
-        let inverse_depths = &self.inverse_depths[(line + 1) * self.length + 1..];
-        for x in (0..whole).step_by(S::LANES) {
-            let points = cloud.points[start + x..][..S::LANES].as_ptr().cast();
-            // SAFETY: as the caller's; so many points are there, and so many elements.
-            unsafe {
-                let inverse = S::load(inverse_depths[x..][..S::LANES].as_ptr());
-                let point = S::load_points(points, size_of::<[f32; 3]>());
-                for axis in 0..self.axes {
-                    let to = &mut self.rays[axis][line * self.length + 1 + x..][..S::LANES];
-                    S::store(to.as_mut_ptr(), S::mul(point[axis], inverse));
-                }
-            }
-        }
-        for x in whole..cloud.width {
-            let ray = cloud.ray(start + x);
-            for axis in 0..self.axes {
-                self.rays[axis][line * self.length + 1 + x] = ray[axis];
-            }
-        }
     }
 
     /// Finds the means around the pixels of a line of the blocks, whose clean radii are these.
@@ -861,19 +820,21 @@ impl Rows {
         }
     }
 
-    /// The pixels of some blocks, at most as many as there are lanes, whose first columns are these: lanes without one take
-    /// no window. Pixels of the mask `exact` count alone.
+    /// The pixels of some blocks, at most as many as there are lanes, whose first columns are these, in a `row` of blocks:
+    /// lanes without one take no window. Pixels of the mask `exact` count alone.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn pixels<S: Along>(
         &self,
+        even: &EvenWindows,
+        row: usize,
         columns: &[usize; LANES],
         blocks: usize,
         exact: S::F,
-        options: &Options,
     ) -> [Pixels<S>; BLOCK * BLOCK] {
+        let &EvenWindows { cloud, options, .. } = even;
         let last = columns.iter().max().expect("a lane");
         assert!(last + 1 + BLOCK <= self.length);
         // SAFETY: as the caller's; the rows have so many elements from every column on.
@@ -885,29 +846,26 @@ impl Rows {
                 let depths = self.four::<S>(&self.depths, line, columns);
                 let inverse_depths = self.four::<S>(&self.inverse_depths, line + 1, columns);
                 let means = self.four::<S>(&self.means, line, columns);
-                let mut rays = [[one; BLOCK]; AXES];
-                for axis in 0..self.axes {
-                    rays[axis] = self.four::<S>(&self.rays[axis], line, columns);
-                }
+                // Rows below the image are none's.
+                let y = (row * BLOCK + line).min(cloud.height - 1);
+                let points = four_points::<S>(&cloud.points[y * cloud.width..], columns);
                 for column in 0..BLOCK {
                     let depth = S::select(there, depths[column], none);
-                    let (inverse_depth, mean) = (inverse_depths[column], means[column]);
+                    let (inverse_depth, mean) = (Floats(inverse_depths[column]), means[column]);
                     let has_mean = S::and_not(exact, S::eq(mean, mean));
                     let near = Near {
-                        inverse_depth: Floats(S::select(has_mean, mean, inverse_depth)),
+                        inverse_depth: Floats(S::select(has_mean, mean, inverse_depth.0)),
                         points: Floats(S::select(has_mean, S::splat(NEXT), one)),
                     };
+                    let [x, y, z] = points[column];
+                    let z = if cloud.has_range { z * inverse_depth } else { Floats(one) };
                     let number = line * BLOCK + column;
                     pixels[number] = Pixels {
                         number: Floats::splat(number as f32),
                         at: [from_middle(column), from_middle(line)],
                         there: Floats(S::eq(depth, depth)),
-                        ray: [
-                            Floats(rays[0][column]),
-                            Floats(rays[1][column]),
-                            Floats(rays[2][column]),
-                        ],
-                        inverse_depth: Floats(inverse_depth),
+                        ray: [x * inverse_depth, y * inverse_depth, z],
+                        inverse_depth,
                         tolerance: tolerance::<S>(depth, options),
                         near,
                     };
@@ -931,6 +889,34 @@ impl Rows {
         let row = rows[line * self.length..][..self.length].as_ptr();
         // SAFETY: as the caller's.
         unsafe { load_by_fours::<S>(|lane| row.add(1 + columns[lane])) }
+    }
+}
+
+/// x, y and z of the points in the columns of a block's line, which is in a row that starts with these points, for each lane
+/// the block that starts with one of these columns.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn four_points<S: Along>(
+    points: &[[f32; 3]],
+    columns: &[usize; LANES],
+) -> [[Floats<S>; 3]; BLOCK] {
+    let last = columns.iter().max().expect("a lane");
+    assert!(last + BLOCK <= points.len());
+    let points = points.as_ptr().cast::<f32>();
+    // SAFETY: as the caller's; so many points are there.
+    unsafe {
+        let first = |lane: usize| points.add(3 * columns[lane]);
+        let [x0, y0, z0, x1] = load_by_fours::<S>(first);
+        let [y1, z1, x2, y2] = load_by_fours::<S>(|lane| first(lane).add(4));
+        let [z2, x3, y3, z3] = load_by_fours::<S>(|lane| first(lane).add(8));
+        [
+            [Floats(x0), Floats(y0), Floats(z0)],
+            [Floats(x1), Floats(y1), Floats(z1)],
+            [Floats(x2), Floats(y2), Floats(z2)],
+            [Floats(x3), Floats(y3), Floats(z3)],
+        ]
     }
 }
 

@@ -60,9 +60,9 @@ struct Eight {
 /// The planes through the points of eight windows.
 #[derive(Clone, Copy)]
 struct Fits<S: Groups> {
+    sums: [Doubles<S>; MOMENTS],
     q: [Doubles<S>; 3],
     ray: [Doubles<S>; 3],
-    points: Doubles<S>,
     unevenness: Doubles<S>,
     steepness_squared: Doubles<S>,
     /// The lanes that have one, those in which rounding may have had a say, and those that hold hidden points.
@@ -72,6 +72,54 @@ struct Fits<S: Groups> {
 }
 
 impl<S: Groups> Fits<S> {
+    /// None.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn none() -> Self {
+        // SAFETY: as the caller's.
+        let [one, unevenness] = unsafe { [Doubles::splat(1.0), Doubles::splat(f64::INFINITY)] };
+        let (three, sums) = ([one; 3], [one; MOMENTS]);
+        let (there, doubtful, hidden) = (0, 0, 0);
+        Fits {
+            sums,
+            q: three,
+            ray: three,
+            unevenness,
+            steepness_squared: one,
+            there,
+            doubtful,
+            hidden,
+        }
+    }
+
+    /// Takes the planes of others in some lanes.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn take(&mut self, lanes: u32, others: &Self) {
+        // SAFETY: as the caller's.
+        unsafe {
+            for i in 0..MOMENTS {
+                self.sums[i].take(lanes, others.sums[i]);
+            }
+            for i in 0..3 {
+                self.q[i].take(lanes, others.q[i]);
+                self.ray[i].take(lanes, others.ray[i]);
+            }
+            self.unevenness.take(lanes, others.unevenness);
+            self.steepness_squared.take(lanes, others.steepness_squared);
+        }
+    }
+
+    /// How many points there are.
+    #[inline(always)]
+    fn points(&self) -> Doubles<S> {
+        self.sums[3]
+    }
+
     /// The variance that the unevenness may be of.
     ///
     /// # Safety
@@ -80,7 +128,7 @@ impl<S: Groups> Fits<S> {
     unsafe fn noise(&self) -> Doubles<S> {
         // SAFETY: as the caller's.
         unsafe {
-            let chance = Floats::splat(2.0) / (self.points.narrow() - Floats::splat(3.0));
+            let chance = Floats::splat(2.0) / (self.points().narrow() - Floats::splat(3.0));
             let chance = Floats::splat(1.0) + Floats::splat(CHANCE) * chance.sqrt();
             self.unevenness * chance.widen()
         }
@@ -234,50 +282,41 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
             let mut radii = largest;
             radii.take(S::mask(jagged), wanted);
             let mut found = zero;
-            let mut unevenness = Doubles::<S>::splat(f64::INFINITY);
-            let (mut doubtful, mut hidden) = (0, 0);
+            let mut best = Fits::<S>::none();
+            let (mut doubtful, mut hidden, mut decided) = (0, 0, 0);
             loop {
-                let todo = jagged | even;
-                let is_last = todo == 0;
-                if is_last {
-                    let mut all = [0.0; GROUP];
-                    S::store(all.as_mut_ptr(), found.0);
-                    for lane in Bits(asked & doubtful & !hidden) {
+                let mut todo = jagged | even;
+                if todo == 0 {
+                    // What rounding could decide is left to the plain form.
+                    let mut plain = [0.0; GROUP];
+                    for lane in Bits(asked & doubtful & !hidden & !decided) {
                         let window = even_window(cloud, self.even.asked, block + lane);
                         windows[lane] = window.unwrap_or_default();
-                        all[lane] = windows[lane].radius;
+                        plain[lane] = windows[lane].radius;
+                        decided |= 1 << lane;
+                        todo |= u32::from(plain[lane] > 0.0) << lane;
                     }
-                    for lane in Bits(asked & hidden) {
-                        windows[lane].radius = WAITS;
-                        all[lane] = 0.0;
+                    radii = Floats::load(plain.as_ptr());
+                    found.take(S::mask(decided), radii);
+                    if todo == 0 {
+                        break;
                     }
-                    run.radii[group * GROUP..][..GROUP].copy_from_slice(&all);
-                    radii = Floats::load(all.as_ptr());
                 }
-                let lanes = if is_last { zero.lt(radii) } else { todo };
-                let rects = Rects::new(rings, &pixels, radii, lanes, None);
+                let rects = Rects::new(rings, &pixels, radii, todo, None);
                 let sums = rects.sums(rings, 0);
                 let fits = self.fits(method, &sums, eight.error);
-                if is_last {
-                    write(&fits, radii, lanes, asked & !doubtful & !hidden, windows);
-                    CovarianceMatrix::note::<S>(
-                        &sums,
-                        &rects,
-                        rings,
-                        lanes,
-                        &mut run.sums,
-                        group * GROUP,
-                    );
-                    return (lanes, hidden);
+                if decided != 0 {
+                    best.take(todo, &fits);
+                    break;
                 }
                 doubtful |= fits.doubtful & todo;
                 if hides_some {
                     hidden |= fits.hidden & todo;
                 }
                 let is_jagged = jagged & fits.there & self.jagged(&fits, &pixels, radii, y);
-                let is_better = even & fits.there & !unevenness.lt(fits.noise().max(least));
+                let is_better = even & fits.there & !best.unevenness.lt(fits.noise().max(least));
                 found.take(S::mask(is_jagged | is_better), radii);
-                unevenness.0 = S::select_bits_d(is_better, fits.unevenness.0, unevenness.0);
+                best.take(is_jagged | is_better, &fits);
                 let seven_tenths = radii * Floats::splat(7.0) / Floats::splat(10.0);
                 let next = Floats(S::truncate(seven_tenths.0));
                 let half = Floats(S::truncate((radii * Floats::splat(0.5)).0));
@@ -290,6 +329,14 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
                 radii.take(S::mask(starts), largest);
                 even |= starts;
             }
+            for lane in Bits(asked & hidden) {
+                windows[lane].radius = WAITS;
+            }
+            let there = zero.lt(found) & asked & !hidden;
+            write(&best, found, there, asked & !decided & !hidden, windows);
+            S::store(run.radii[group * GROUP..].as_mut_ptr(), found.0);
+            CovarianceMatrix::note_sums(&best.sums, &mut run.sums, group * GROUP);
+            (there, hidden)
         }
     }
 
@@ -352,16 +399,16 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
             let deep = Doubles::splat(Plane::DEEP) * length2 * length2;
             let is_deep = deep.lt(along);
             let mut steepness_squared = slope2 * angle2;
-            unevenness.0 = S::select_bits_d(is_deep, S::splat_d(f64::INFINITY), unevenness.0);
-            steepness_squared.0 = S::select_bits_d(is_deep, S::splat_d(0.0), steepness_squared.0);
+            unevenness.take(is_deep, Doubles::splat(f64::INFINITY));
+            steepness_squared.take(is_deep, Doubles::splat(0.0));
             let rounded = !((along + of_trace).lt(deep) | (deep + of_trace).lt(along))
                 | !is_deep & !is_none & !of_deviation.lt(allowed)
                 | !is_deep & !((seen + of_seen).lt(line) | (line + enough_seen).lt(seen));
             let by_depth = Doubles::splat(1.0) / depth;
             Fits {
+                sums: *sums,
                 q,
                 ray: [m[0] * by_depth, m[1] * by_depth, m[2] * by_depth],
-                points: n,
                 unevenness,
                 steepness_squared,
                 there: enough & (is_deep | line.lt(seen)),
@@ -391,7 +438,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
             let steep = Doubles::splat(JAGGED * JAGGED) * fits.steepness_squared;
             let fewest = Doubles::splat(JAGGED_POINTS) * area.widen();
             let least = Doubles::splat(self.even.asked.least_noise.into());
-            !steep.lt(fits.unevenness) & !steep.lt(least) & !fits.points.lt(fewest)
+            !steep.lt(fits.unevenness) & !steep.lt(least) & !fits.points().lt(fewest)
         }
     }
 }
@@ -408,7 +455,7 @@ unsafe fn write<S: Groups>(
     asked: u32,
     windows: &mut [EvenWindow],
 ) {
-    let &Fits { q, ray, points, unevenness, steepness_squared, .. } = fits;
+    let &Fits { q, ray, unevenness, steepness_squared, .. } = fits;
     let mut fields = [[0.0; GROUP]; 11];
     // SAFETY: as the caller's; the arrays hold so many lanes.
     unsafe {
@@ -426,7 +473,7 @@ unsafe fn write<S: Groups>(
             steepness,
             unevenness.narrow(),
             noise.narrow(),
-            points.narrow(),
+            fits.points().narrow(),
         ];
         for i in 0..values.len() {
             S::store(fields[i].as_mut_ptr(), values[i].0);

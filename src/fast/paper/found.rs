@@ -26,9 +26,7 @@ impl FoundRow<'_> {
     pub unsafe fn write<S: Along>(&self) {
         let &FoundRow { cloud, options, second_pass, normals, y } = self;
         let first = y * cloud.width;
-        // Points are read by fours of floats: not the last ones of all.
-        let readable = cloud.width.min(cloud.points.len() - first - 1);
-        let whole = readable / S::LANES * S::LANES;
+        let whole = cloud.width / S::LANES * S::LANES;
         for x in (0..whole).step_by(S::LANES) {
             let at = first + x;
             let mut found = [[0.0; 4].as_ptr(); LANES];
@@ -38,7 +36,8 @@ impl FoundRow<'_> {
             // SAFETY: as the caller's; an estimate is four floats, and so many points are there.
             unsafe {
                 let [nx, ny, nz, curvature] = load_by_fours::<S>(|lane| found[lane]);
-                let points = cloud.points[at..][..S::LANES].as_ptr().cast();
+                // Read by fours of floats.
+                let points = cloud.points[at..][..=S::LANES].as_ptr().cast();
                 let [px, py, pz] = S::load_points(points, size_of::<[f32; 3]>());
                 let normal = [Floats(nx), Floats(ny), Floats(nz)];
                 let [nx, ny, nz] =

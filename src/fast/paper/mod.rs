@@ -115,7 +115,7 @@ pub(crate) fn compute_with_radii(
     points: &Points,
     options: &Options,
     normals: &Normals,
-    radii: &mut Vec<u32>,
+    radii: &mut Vec<f32>,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
     compute(isa, points, options, None, normals, scratch)?;
@@ -123,13 +123,12 @@ pub(crate) fn compute_with_radii(
 }
 
 /// Reads the radii of all pixels' windows, which have been found.
-fn read_radii(points: &Points, radii: &mut Vec<u32>, scratch: &Scratch) -> Result<(), Error> {
+fn read_radii(points: &Points, radii: &mut Vec<f32>, scratch: &Scratch) -> Result<(), Error> {
     let length = row_length(points.width());
     let Scratch { chunks, radii: map, .. } = scratch;
     make_room(radii, points.width() * points.height())?;
     for place in chunks.iter().flat_map(|chunk| chunk.own.clone().map(|y| chunk.place(y))) {
-        let row = &map[place * length..][..points.width()];
-        radii.extend(row.iter().map(|radius| *radius as u32));
+        radii.extend_from_slice(&map[place * length..][..points.width()]);
     }
     Ok(())
 }
@@ -191,7 +190,7 @@ pub(crate) struct Along<'a> {
     /// The normals of all pixels, if the radii of their windows are wanted as well, as [`compute_with_radii`] gives them; in
     /// the paper's semantics.
     pub pixels: &'a Normals<'a>,
-    pub radii: Option<&'a mut Vec<u32>>,
+    pub radii: Option<&'a mut Vec<f32>>,
     /// The normals of the even windows.
     pub blocks: Option<&'a Normals<'a>>,
 }
