@@ -95,23 +95,17 @@ impl<S: Groups> Fits<S> {
     }
 
     /// Takes the planes of others in some lanes.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn take(&mut self, lanes: u32, others: &Self) {
-        // SAFETY: as the caller's.
-        unsafe {
-            for i in 0..MOMENTS {
-                self.sums[i].take(lanes, others.sums[i]);
-            }
-            for i in 0..3 {
-                self.q[i].take(lanes, others.q[i]);
-                self.ray[i].take(lanes, others.ray[i]);
-            }
-            self.unevenness.take(lanes, others.unevenness);
-            self.steepness_squared.take(lanes, others.steepness_squared);
+    fn take(&mut self, lanes: u32, others: &Self) {
+        for i in 0..MOMENTS {
+            self.sums[i].take(lanes, others.sums[i]);
         }
+        for i in 0..3 {
+            self.q[i].take(lanes, others.q[i]);
+            self.ray[i].take(lanes, others.ray[i]);
+        }
+        self.unevenness.take(lanes, others.unevenness);
+        self.steepness_squared.take(lanes, others.steepness_squared);
     }
 
     /// How many points there are.
