@@ -102,6 +102,7 @@ fn the_second_pass_keeps_creases_sharp() {
         ("ridge-135", 120.0),
         ("box", 160.0),
         ("room", 120.0),
+        ("tabletop", 200.0),
     ];
     for (name, y) in scenes {
         for (noise, times) in [(Noise::None, 25.0), (Noise::Nguyen, 2.0), (Noise::Khoshelham, 3.5)]

@@ -68,8 +68,8 @@ pub(crate) struct EvenWindows<'a> {
     pub options: &'a Options,
     /// The pixels that take one.
     pub concerned: &'a [bool],
-    /// From how many radii the windows come that a block's pixels can take, starting with the largest and halving it,
-    /// block by block; 0 for a block that takes none.
+    /// From how many radii at most the windows come that a block's pixels can take, starting with the largest and halving
+    /// it, block by block; 0 for a block that takes none.
     pub levels: &'a [u8],
     /// Block by block.
     pub windows: &'a [EvenWindow],
@@ -88,8 +88,10 @@ impl EvenWindows<'_> {
         let (x, y) = (block % across, block / across);
         visit(block);
         let largest = self.asked.largest(block);
-        let radii = (0..self.levels[block]).map(|level| (level, largest >> level));
-        for (level, radius) in radii.take_while(|(_, radius)| *radius > 0) {
+        // Smaller ones have the same places.
+        let half = |radius: &u32| (*radius > BLOCK as u32).then_some(radius / 2);
+        let radii = std::iter::successors((largest > 0).then_some(largest), half);
+        for (level, radius) in (0..self.levels[block]).zip(radii) {
             let columns = places(x, radius as usize, across);
             let rows = places(y, radius as usize, down).map(|row| row * across);
             for (column, row) in places_at(level) {

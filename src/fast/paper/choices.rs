@@ -522,7 +522,9 @@ impl Group<'_> {
                 for (column, row) in places_at(level) {
                     found.add(even.windows, across[*column], down[*row], may_take);
                 }
-                radii = Floats(S::truncate((radii * Floats::splat(0.5)).0));
+                let has_smaller = S::lt(S::splat(BLOCK as f32), radii.0);
+                let half = S::truncate((radii * Floats::splat(0.5)).0);
+                radii = Floats(S::and(has_smaller, half));
                 level += 1;
             }
         }

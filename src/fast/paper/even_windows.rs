@@ -3,7 +3,7 @@
 
 use super::integrals::Rings;
 use super::layers::{Layer, Waiting, with_fraction};
-use super::methods::{CovarianceMatrix, MOMENTS, Sums};
+use super::methods::{CovarianceMatrix, MOMENTS};
 use super::rects::{Pixels, Rects, range};
 use super::tile::{Run, Tile};
 use crate::fast::Parts;
