@@ -90,11 +90,8 @@ impl DepthChanges {
         /// How far the surface is looked at along and across a change, in pixels.
         const ALONG: usize = 5;
         const ACROSS: usize = 2;
-        /// The least share of a change that a surface changes within `ALONG` pixels which explains it.
-        const FLAT: f32 = 0.4;
         let &Cloud { width, height, .. } = cloud;
         let inverse = |at: usize| inverse_depth(cloud.depths[at]);
-        let ray = |at: usize| cloud.ray(at).map(f64::from);
         // `at` is the last pixel before the change.
         let is_explained = |axis: usize, at: usize| {
             let pixel = [at % width, at / width];
@@ -114,12 +111,7 @@ impl DepthChanges {
             let before = rect(before.saturating_sub(ALONG)..before);
             let after = rect(after..(after + ALONG).min(length));
             let is_steep = |rect: Rect| {
-                // Cheaper to see, and true of most edges: it is too flat.
-                if inverse_range(cloud, &rect) < FLAT * jump {
-                    return Some(false);
-                }
-                let plane = Plane::of(cloud, &rect)?;
-                let change = plane.at(ray(next)) - plane.at(ray(last));
+                let change = slope(cloud, &rect, axis)? * gap as f64;
                 Some(f64::from(jump) <= f64::from(JITTER) * change.abs())
             };
             let mut sides = [before, after].into_iter().filter_map(is_steep);
@@ -154,15 +146,30 @@ impl DepthChanges {
     }
 }
 
-/// How far apart the inverse depths of a rectangle's points are.
-fn inverse_range(cloud: &Cloud, rect: &Rect) -> f32 {
-    let rows = rect.y.clone().map(|y| &cloud.depths[y * cloud.width..][rect.x.clone()]);
-    let (mut least, mut largest) = (f32::INFINITY, f32::NEG_INFINITY);
-    for &depth in rows.flatten() {
-        least = if depth < least { depth } else { least };
-        largest = if depth > largest { depth } else { largest };
+/// How much the inverse depth changes from pixel to pixel along the rows, axis 0, or the columns, in the plane that fits a
+/// rectangle's points best; none if there are too few to tell, or if they are on one line of the image.
+fn slope(cloud: &Cloud, rect: &Rect, axis: usize) -> Option<f64> {
+    let [mut n, mut x, mut y, mut xx, mut xy, mut yy] = [0.0; 6];
+    let [mut d, mut xd, mut yd] = [0.0; 3];
+    for (row, place_y) in rect.y.clone().zip(0..) {
+        let depths = &cloud.depths[row * cloud.width..][rect.x.clone()];
+        for (depth, place_x) in depths.iter().zip(0..) {
+            let inverse = f64::from(inverse_depth(*depth));
+            if !inverse.is_nan() {
+                let (px, py) = (f64::from(place_x), f64::from(place_y));
+                n += 1.0;
+                (x, y, d) = (x + px, y + py, d + inverse);
+                (xx, xy, yy) = (xx + px * px, xy + px * py, yy + py * py);
+                (xd, yd) = (xd + px * inverse, yd + py * inverse);
+            }
+        }
     }
-    (inverse_depth(least) - inverse_depth(largest)).abs()
+    // About the mean, times n.
+    let (xx, xy, yy) = (n * xx - x * x, n * xy - x * y, n * yy - y * y);
+    let (xd, yd) = (n * xd - x * d, n * yd - y * d);
+    let determinant = xx * yy - xy * xy;
+    let slopes = [xd * yy - yd * xy, yd * xx - xd * xy];
+    (n >= Plane::FEWEST && determinant > 0.0).then(|| slopes[axis] / determinant)
 }
 
 /// Calls `visit` with the columns of a row that are marked, and the marks. They are few: most of the row is looked at by sixteens.
