@@ -75,11 +75,6 @@ impl Plane {
             steepness_squared: if is_deep { 0.0 } else { slope2 * angle2 },
         })
     }
-
-    /// The inverse depth along a ray.
-    pub fn at(&self, ray: [f64; 3]) -> f64 {
-        dot(self.q, ray)
-    }
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
