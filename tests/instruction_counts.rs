@@ -96,7 +96,7 @@ fn main() -> ExitCode {
         }
         if (semantics, method) == (Paper, CovarianceMatrix) {
             let (count, _) = count(Scene { second_pass: true, ..usual });
-            check(count, 5 * bound, ", with a second pass");
+            check(count, 3 * bound + bound / 4, ", with a second pass");
         }
         let (count, stages) = count(usual);
         check(count, bound, "");
