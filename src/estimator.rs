@@ -384,6 +384,18 @@ impl Engine<'_> {
         refill(estimates, pixels.map(|pixel| turned(pixel).into()))
     }
 
+    /// As [`Engine::plain`], of the windows of these radii, by block, around blocks' middle pixels.
+    fn plain_of_blocks(
+        &self,
+        blocks: &Blocks,
+        radius: impl Fn(usize) -> u32,
+        estimates: &mut Vec<[f32; 4]>,
+    ) -> Result<(), Error> {
+        let block = |(x, y): (usize, usize)| blocks.block(y * self.points.width() + x);
+        let pixels = (0..blocks.count()).map(|block| blocks.middle(block));
+        self.plain(pixels, estimates, |pixel| self.of_radius(pixel, radius(block(pixel))))
+    }
+
     /// The plain form's estimate of the paper's method from the window of a radius, if that is not 0.
     fn of_radius(&self, pixel: (usize, usize), radius: u32) -> Option<Estimate> {
         let of_radius = || paper::of_radius(self.points, self.options, pixel, radius as usize);
@@ -432,9 +444,8 @@ impl paper::Engine for Engine<'_> {
             self.windows(found)?;
             let Windows { even, of_even, .. } = found;
             refill(even, paper::even_windows(cloud, asked))?;
-            let pixels = (0..even.len()).map(|block| asked.blocks.middle(block));
-            let radius = |(x, y)| even[asked.blocks.block(y * cloud.width + x)].radius as u32;
-            return self.plain(pixels, of_even, |pixel| self.of_radius(pixel, radius(pixel)));
+            let radius = |block: usize| even[block].radius as u32;
+            return self.plain_of_blocks(&asked.blocks, radius, of_even);
         }
         // CM's sums are what even windows are made from.
         let has_normals = self.options.method == Method::CovarianceMatrix;
@@ -470,9 +481,7 @@ impl paper::Engine for Engine<'_> {
         estimates: &mut Vec<[f32; 4]>,
     ) -> Result<(), Error> {
         if self.is_plain {
-            let pixels = (0..blocks.count()).map(|block| blocks.middle(block));
-            let radius = |(x, y)| radii[blocks.block(y * self.points.width() + x)];
-            return self.plain(pixels, estimates, |pixel| self.of_radius(pixel, radius(pixel)));
+            return self.plain_of_blocks(blocks, |block| radii[block], estimates);
         }
         let size = (blocks.across, blocks.down);
         self.written(size, estimates, |isa, points, options, normals, scratch| {

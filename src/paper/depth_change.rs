@@ -172,7 +172,8 @@ fn slope(cloud: &Cloud, rect: &Rect, axis: usize) -> Option<f64> {
     (n >= Plane::FEWEST && determinant > 0.0).then(|| slopes[axis] / determinant)
 }
 
-/// Calls `visit` with the columns of a row that are marked, and the marks. They are few: most of the row is looked at by sixteens.
+/// Calls `visit` with the columns of a row that are marked, and the marks. They are few: most of the row is looked at by
+/// sixteens.
 fn for_each_mark(row: &mut [bool], mut visit: impl FnMut(usize, &mut bool)) {
     const TOGETHER: usize = 16;
     let (all, rest) = row.as_chunks_mut::<TOGETHER>();

@@ -837,9 +837,9 @@ impl Rows {
         exact: S::F,
     ) -> [Pixels<S>; BLOCK * BLOCK] {
         let &EvenWindows { cloud, options, .. } = even;
-        let last = columns.iter().max().expect("a lane");
-        assert!(last + 1 + BLOCK <= self.length);
-        // SAFETY: as the caller's; the rows have so many elements from every column on.
+        let (width, height) = (cloud.width, cloud.height);
+        assert!(columns.iter().all(|column| *column < width) && width + BLOCK < self.length);
+        // SAFETY: as the caller's; there are so many elements and points from every column on.
         unsafe {
             let there = S::mask((1 << blocks) - 1);
             let (none, one) = (S::splat(f32::NAN), S::splat(1.0));
@@ -849,8 +849,9 @@ impl Rows {
                 let inverse_depths = self.four::<S>(&self.inverse_depths, line + 1, columns);
                 let means = self.four::<S>(&self.means, line, columns);
                 // Rows below the image are none's.
-                let y = (row * BLOCK + line).min(cloud.height - 1);
-                let points = four_points::<S>(&cloud.points[y * cloud.width..], columns);
+                let y = (row * BLOCK + line).min(height - 1);
+                let points = &cloud.points[y * width..][..width + BLOCK - 1];
+                let points = four_points::<S>(points, columns);
                 for column in 0..BLOCK {
                     let depth = S::select(there, depths[column], none);
                     let (inverse_depth, mean) = (Floats(inverse_depths[column]), means[column]);
@@ -898,16 +899,14 @@ impl Rows {
 /// the block that starts with one of these columns.
 ///
 /// # Safety
-/// The processor has the instruction set of `S`.
+/// The processor has the instruction set of `S`; there are so many points from every column on.
 #[inline(always)]
 unsafe fn four_points<S: Along>(
     points: &[[f32; 3]],
     columns: &[usize; LANES],
 ) -> [[Floats<S>; 3]; BLOCK] {
-    let last = columns.iter().max().expect("a lane");
-    assert!(last + BLOCK <= points.len());
     let points = points.as_ptr().cast::<f32>();
-    // SAFETY: as the caller's; so many points are there.
+    // SAFETY: as the caller's.
     unsafe {
         let first = |lane: usize| points.add(3 * columns[lane]);
         let [x0, y0, z0, x1] = load_by_fours::<S>(first);
