@@ -496,6 +496,16 @@ impl<'a> Normals<'a> {
         Ok(())
     }
 
+    /// Whether what was written to a pixel is a normal.
+    ///
+    /// # Safety
+    /// As [`Normals::write`], which was called for the pixel.
+    #[inline(always)]
+    pub(crate) unsafe fn has_normal(&self, x: usize, y: usize) -> bool {
+        // SAFETY: as the caller's.
+        !unsafe { self.normal[0].byte_add(self.grid.offset(x, y)).read() }.is_nan()
+    }
+
     /// Writes one pixel.
     ///
     /// # Safety

@@ -7,6 +7,7 @@ use crate::cloud::{Normals, Points};
 use crate::depth_change::depth_change_map;
 use crate::distance::distance_map;
 use crate::eigenvalues::eigenvalue_map;
+use crate::fast::paper::{Along, Job};
 use crate::fast::{self, SIZES, Scratch};
 use crate::isa::Isa;
 use crate::memory::{refill, resize};
@@ -133,31 +134,23 @@ impl Estimator {
     ) -> Result<(), Error> {
         let Options { semantics, one_sided_windows, crease_windows, .. } = self.options;
         if !self.is_plain(points) {
-            let (options, scratch) = (&self.options, &mut self.scratch);
+            let Estimator { ref options, isa, ref mut scratch, .. } = *self;
             if semantics == Semantics::Paper && !(one_sided_windows || crease_windows) {
-                return fast::paper::compute(self.isa, points, options, indices, normals, scratch);
+                let whole_points = points.has_whole_points(normals);
+                let job = Job { isa, points, options, whole_points };
+                return fast::paper::compute(&job, indices, normals, scratch);
             }
             if !options.is_beyond_pcl() {
-                return fast::compute(self.isa, points, options, indices, normals, scratch);
+                return fast::compute(isa, points, options, indices, normals, scratch);
             }
+        }
+        if self.options.is_beyond_pcl() {
+            return self.second_pass(points, indices, normals);
         }
         let width = points.width();
-        if self.options.is_beyond_pcl() {
-            self.second_pass(points, points.has_whole_points(normals))?;
-            let is_plain = self.is_plain(points);
-            let Estimator { options, isa, scratch, cloud, second_pass } = &*self;
-            let workers = scratch.workers();
-            if is_plain || indices.is_some() {
-                let estimate = |pixel| second_pass.estimate(cloud, options, pixel);
-                write(normals, indices, width, workers, estimate);
-            } else {
-                fast::paper::write_found(*isa, second_pass, cloud, options, normals, workers);
-            }
-        } else {
-            let plain = Plain::new(points, &self.options)?;
-            let estimate = |pixel: usize| plain.estimate(pixel % width, pixel / width);
-            write(normals, indices, width, &Workers::default(), estimate);
-        }
+        let plain = Plain::new(points, &self.options)?;
+        let estimate = |pixel: usize| plain.estimate(pixel % width, pixel / width);
+        write(normals, indices, width, &Workers::default(), |_, pixel| Some(estimate(pixel)));
         Ok(())
     }
 
@@ -275,24 +268,59 @@ impl Estimator {
         self.options.zero_is_missing.then(cleaned).transpose()
     }
 
-    /// Computes what the estimates are made from where PCL's windows and sums alone are not what is asked for.
-    /// `whole_points` as [`Points::has_whole_points`] says.
-    fn second_pass(&mut self, points: &Points, whole_points: bool) -> Result<(), Error> {
+    /// As [`Estimator::compute_pixels`], where PCL's windows and sums alone are not what is asked for.
+    fn second_pass(
+        &mut self,
+        points: &Points,
+        indices: Option<&[i32]>,
+        normals: &Normals,
+    ) -> Result<(), Error> {
         let is_plain = self.is_plain(points);
         let Estimator { options, isa, scratch, cloud, second_pass } = self;
+        let isa = *isa;
+        let whole_points = points.has_whole_points(normals);
+        let job = Job { isa, points, options, whole_points };
         scratch.prepare(options.threads)?;
         if is_plain {
             cloud.read(points, options)?;
         } else {
-            let workers = scratch.workers();
-            fast::paper::read_cloud(*isa, points, whole_points, options, cloud, workers)?;
+            fast::paper::read_cloud(&job, cloud, scratch.workers())?;
         }
         // To PCL's windows, a point that misses a coordinate is missing whole.
         let is_pcl = options.semantics == Semantics::Pcl;
         let cleaned = is_pcl.then(|| packed(&cloud.points, cloud.width, cloud.height));
         let points = cleaned.as_ref().unwrap_or(points);
-        let mut engine = Engine { points, options, isa: *isa, scratch, is_plain };
-        second_pass.compute(cloud, options, &mut engine)
+        let job = Job { points, ..job };
+        let mut engine = Engine { job, scratch, is_plain };
+        second_pass.compute(cloud, options, &mut engine)?;
+        let width = cloud.width;
+        let chosen = |at: usize| second_pass.chosen(cloud, options, at);
+        if is_plain {
+            let own = engine.own(second_pass.sizes())?;
+            let estimate = |at: usize| chosen(at).unwrap_or_else(|| own(at));
+            write(normals, indices, width, engine.scratch.workers(), |_, at| Some(estimate(at)));
+        } else {
+            if is_pcl {
+                fast::compute(isa, points, options, indices, normals, scratch)?;
+            } else {
+                let choices = second_pass.choices();
+                fast::paper::compute_own(&job, choices, indices, normals, scratch)?;
+            }
+            let workers = scratch.workers();
+            if indices.is_some() {
+                write(normals, indices, width, workers, |_, at| chosen(at));
+            } else {
+                fast::paper::write_chosen(&job, second_pass, cloud, normals, workers);
+            }
+        }
+        if options.one_sided_windows {
+            write(normals, indices, width, scratch.workers(), |(x, y), at| {
+                // SAFETY: every normal has been written, and falls to one thread.
+                let has_normal = || unsafe { normals.has_normal(x, y) };
+                second_pass.estimate_around(cloud, options, at, has_normal)
+            });
+        }
+        Ok(())
     }
 
     /// How much scratch memory is held, in bytes.
@@ -308,18 +336,20 @@ impl Estimator {
     }
 }
 
-/// Writes the estimates of the pixels that `indices` list, or of all pixels of an image of this width.
+/// Writes the estimates of the pixels that `indices` list, or of all pixels of an image of this width, for which there is
+/// one: `estimate` gives those of normals, by column and row, and of the pixels that they belong to.
 fn write(
     normals: &Normals,
     indices: Option<&[i32]>,
     width: usize,
     workers: &Workers,
-    estimate: impl Fn(usize) -> Estimate + Sync,
+    estimate: impl Fn((usize, usize), usize) -> Option<Estimate> + Sync,
 ) {
     let put = |x: usize, y: usize, pixel: usize| {
-        let Estimate { normal, curvature } = estimate(pixel);
-        // SAFETY: there is an element for every index, or for every pixel, which falls to one thread.
-        unsafe { normals.write(x, y, normal, curvature) };
+        if let Some(Estimate { normal, curvature }) = estimate((x, y), pixel) {
+            // SAFETY: there is an element for every index, or for every pixel, which falls to one thread.
+            unsafe { normals.write(x, y, normal, curvature) };
+        }
     };
     match indices {
         None => workers.for_each(normals.height(), |_, y| {
@@ -348,58 +378,46 @@ fn normals_of(
 
 /// The windows and estimates that the one-sided and crease windows build on.
 struct Engine<'a> {
-    points: &'a Points<'a>,
-    options: &'a Options,
-    isa: Isa,
+    job: Job<'a>,
     scratch: &'a mut Scratch,
     is_plain: bool,
 }
 
 impl Engine<'_> {
-    /// The `width` x `height` estimates that `compute` writes.
-    fn written(
-        &mut self,
-        size: (usize, usize),
-        estimates: &mut Vec<[f32; 4]>,
-        compute: impl FnOnce(Isa, &Points, &Options, &Normals, &mut Scratch) -> Result<(), Error>,
-    ) -> Result<(), Error> {
-        let normals = normals_of(estimates, size)?;
-        compute(self.isa, self.points, self.options, &normals, self.scratch)
-    }
-
-    /// The plain form's estimates of these pixels, where there are some.
-    fn plain(
-        &self,
-        pixels: impl ExactSizeIterator<Item = (usize, usize)>,
-        estimates: &mut Vec<[f32; 4]>,
-        estimate: impl Fn((usize, usize)) -> Option<Estimate>,
-    ) -> Result<(), Error> {
-        let turned = |(x, y): (usize, usize)| {
-            estimate((x, y)).map_or(Estimate::NONE, |found| {
-                let point = self.points.at(x, y);
-                let normal = turn_to_viewpoint(found.normal, point, self.options.viewpoint);
-                Estimate { normal, ..found }
-            })
-        };
-        refill(estimates, pixels.map(|pixel| turned(pixel).into()))
-    }
-
-    /// As [`Engine::plain`], of the windows of these radii, by block, around blocks' middle pixels.
+    /// The plain form's estimates of the windows of these radii, by block, around blocks' middle pixels.
     fn plain_of_blocks(
         &self,
         blocks: &Blocks,
         radius: impl Fn(usize) -> u32,
         estimates: &mut Vec<[f32; 4]>,
     ) -> Result<(), Error> {
-        let block = |(x, y): (usize, usize)| blocks.block(y * self.points.width() + x);
-        let pixels = (0..blocks.count()).map(|block| blocks.middle(block));
-        self.plain(pixels, estimates, |pixel| self.of_radius(pixel, radius(block(pixel))))
+        let of_block = |block: usize| self.of_radius(blocks.middle(block), radius(block)).into();
+        refill(estimates, (0..blocks.count()).map(of_block))
     }
 
-    /// The plain form's estimate of the paper's method from the window of a radius, if that is not 0.
-    fn of_radius(&self, pixel: (usize, usize), radius: u32) -> Option<Estimate> {
-        let of_radius = || paper::of_radius(self.points, self.options, pixel, radius as usize);
-        (radius > 0).then(of_radius)
+    /// The plain form's estimate of the paper's method from the window of a radius; none if that is 0.
+    fn of_radius(&self, pixel: (usize, usize), radius: u32) -> Estimate {
+        if radius == 0 {
+            return Estimate::NONE;
+        }
+        let Job { points, options, .. } = self.job;
+        let found = paper::of_radius(points, options, pixel, radius as usize);
+        let point = points.at(pixel.0, pixel.1);
+        let normal = turn_to_viewpoint(found.normal, point, options.viewpoint);
+        Estimate { normal, ..found }
+    }
+
+    /// The plain form of the pixels' own estimates, from windows of these sizes.
+    fn own(&self, sizes: &[f32]) -> Result<impl Fn(usize) -> Estimate + Sync, Error> {
+        let Job { points, options, .. } = self.job;
+        let width = points.width();
+        let is_pcl = options.semantics == Semantics::Pcl;
+        let of_pcl = is_pcl.then(|| Plain::new(points, options)).transpose()?;
+        Ok(move |at: usize| {
+            let (x, y) = (at % width, at / width);
+            let of_paper = || self.of_radius((x, y), sizes[at] as u32);
+            of_pcl.as_ref().map_or_else(of_paper, |plain| plain.estimate(x, y))
+        })
     }
 }
 
@@ -408,61 +426,53 @@ impl paper::Engine for Engine<'_> {
         self.scratch.workers()
     }
 
-    fn windows(&mut self, found: &mut Windows) -> Result<(), Error> {
-        let Windows { sizes, estimates, .. } = found;
-        let size @ (width, height) = (self.points.width(), self.points.height());
-        let pixels = (0..width * height).map(|at| (at % width, at / width));
-        if self.options.semantics == Semantics::Pcl {
-            if !self.is_plain {
-                return self.written(size, estimates, |isa, points, options, normals, scratch| {
-                    fast::compute_with_sides(isa, points, options, normals, sizes, scratch)
-                });
+    fn sizes(&mut self, sizes: &mut Vec<f32>) -> Result<(), Error> {
+        let Engine { job, ref mut scratch, is_plain } = *self;
+        let Job { isa, points, options, .. } = job;
+        let (width, height) = (points.width(), points.height());
+        match (options.semantics, is_plain) {
+            (Semantics::Pcl, true) => {
+                let plain = Plain::new(points, options)?;
+                let side = |at: usize| plain.window_side(at % width, at / width) as f32;
+                refill(sizes, (0..width * height).map(side))
             }
-            let plain = Plain::new(self.points, self.options)?;
-            let side = |at: usize| plain.window_side(at % width, at / width);
-            refill(sizes, (0..width * height).map(|at| side(at) as f32))?;
-            return self.plain(pixels, estimates, |(x, y)| Some(plain.estimate(x, y)));
+            (Semantics::Pcl, false) => fast::sides(isa, points, options, sizes, scratch),
+            (_, true) => {
+                let maps = PaperMaps::new(points, options)?;
+                refill(sizes, maps.smoothing_radii.iter().map(|radius| radius.trunc()))
+            }
+            (_, false) => fast::paper::radii(&job, sizes, scratch),
         }
-        if self.is_plain {
-            let maps = PaperMaps::new(self.points, self.options)?;
-            refill(sizes, maps.smoothing_radii.iter().map(|radius| radius.trunc()))?;
-            let of_radius = |(x, y)| self.of_radius((x, y), sizes[y * width + x] as u32);
-            return self.plain(pixels, estimates, of_radius);
-        }
-        self.written(size, estimates, |isa, points, options, normals, scratch| {
-            fast::paper::compute_with_radii(isa, points, options, normals, sizes, scratch)
-        })
     }
 
-    fn windows_and_even(
+    fn even_windows(
         &mut self,
         cloud: &Cloud,
         asked: &Asked,
         found: &mut Windows,
     ) -> Result<(), Error> {
+        let method = Method::CovarianceMatrix;
+        let has_normals = self.job.options.method == method;
+        let Windows { even, of_even, samples, of_samples, .. } = found;
         if self.is_plain {
-            self.windows(found)?;
-            let Windows { even, of_even, .. } = found;
             refill(even, paper::even_windows(cloud, asked))?;
-            let radius = |block: usize| even[block].radius as u32;
-            return self.plain_of_blocks(&asked.blocks, radius, of_even);
+            if has_normals {
+                let blocks = &asked.blocks;
+                self.plain_of_blocks(blocks, |block| even[block].radius as u32, of_even)?;
+                let sample = |block: usize| samples.get(block).copied().unwrap_or(0);
+                self.plain_of_blocks(blocks, sample, of_samples)?;
+            }
+            return Ok(());
         }
+        let size = (asked.blocks.across, asked.blocks.down);
+        let of_even = normals_of(of_even, size)?;
+        let of_samples = normals_of(of_samples, size)?;
+        let along =
+            has_normals.then_some(Along { of_even: &of_even, samples, of_samples: &of_samples });
         // CM's sums are what even windows are made from.
-        let has_normals = self.options.method == Method::CovarianceMatrix;
-        let has_pixels = has_normals && self.options.semantics == Semantics::Paper;
-        if !has_pixels {
-            self.windows(found)?;
-        }
-        let Windows { sizes, estimates, even, of_even } = found;
-        let of_pixels = normals_of(estimates, (cloud.width, cloud.height))?;
-        let of_blocks = normals_of(of_even, (asked.blocks.across, asked.blocks.down))?;
-        let along = fast::paper::Along {
-            pixels: &of_pixels,
-            radii: has_pixels.then_some(sizes),
-            blocks: has_normals.then_some(&of_blocks),
-        };
-        let Engine { points, options, isa, ref mut scratch, .. } = *self;
-        fast::paper::even_windows(isa, points, options, (cloud, asked), even, along, scratch)
+        let options = &Options { method, ..self.job.options.clone() };
+        let job = Job { options, ..self.job };
+        fast::paper::even_windows(&job, (cloud, asked), even, along, self.scratch)
     }
 
     fn choices(&mut self, even: &EvenWindows, choices: &mut Vec<u32>) -> Result<(), Error> {
@@ -471,7 +481,7 @@ impl paper::Engine for Engine<'_> {
             even.choose(choices);
             return Ok(());
         }
-        fast::paper::choices(self.isa, even, choices, self.scratch)
+        fast::paper::choices(self.job.isa, even, choices, self.scratch)
     }
 
     fn of_blocks(
@@ -481,12 +491,11 @@ impl paper::Engine for Engine<'_> {
         estimates: &mut Vec<[f32; 4]>,
     ) -> Result<(), Error> {
         if self.is_plain {
-            return self.plain_of_blocks(blocks, |block| radii[block], estimates);
+            let radius = |block: usize| radii[block];
+            return self.plain_of_blocks(blocks, radius, estimates);
         }
-        let size = (blocks.across, blocks.down);
-        self.written(size, estimates, |isa, points, options, normals, scratch| {
-            fast::paper::compute_of_blocks(isa, points, options, radii, normals, scratch)
-        })
+        let normals = normals_of(estimates, (blocks.across, blocks.down))?;
+        fast::paper::compute_of_blocks(&self.job, radii, &normals, self.scratch)
     }
 }
 

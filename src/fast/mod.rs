@@ -186,15 +186,15 @@ pub(crate) fn compute(
     normals: &Normals,
     scratch: &mut Scratch,
 ) -> Result<(), Error> {
-    compute_slices(isa, points, options, indices, normals, |_, _| (), scratch)
+    let output = Some((indices, normals));
+    compute_slices(isa, points, options, output, |_, _| (), scratch)
 }
 
-/// The sides of all pixels' windows, row by row, 0 for none, and their normals.
-pub(crate) fn compute_with_sides(
+/// The sides of all pixels' windows, row by row, 0 for none.
+pub(crate) fn sides(
     isa: Isa,
     points: &Points,
     options: &Options,
-    normals: &Normals,
     found: &mut Vec<f32>,
     scratch: &mut Scratch,
 ) -> Result<(), Error> {
@@ -208,16 +208,15 @@ pub(crate) fn compute_with_sides(
             to.copy_from_slice(&sides.row(y)[..width]);
         }
     };
-    compute_slices(isa, points, options, None, normals, read, scratch)
+    compute_slices(isa, points, options, None, read, scratch)
 }
 
-/// As [`compute`]; gives every slice's rows and the sides of their windows to `read`.
+/// As [`compute`], if there is an output; gives every slice's rows and the sides of their windows to `read`.
 fn compute_slices(
     isa: Isa,
     points: &Points,
     options: &Options,
-    indices: Option<&[i32]>,
-    normals: &Normals,
+    output: Option<(Option<&[i32]>, &Normals)>,
     read: impl Fn(Range<usize>, Sides) + Sync,
     scratch: &mut Scratch,
 ) -> Result<(), Error> {
@@ -233,7 +232,7 @@ fn compute_slices(
         points,
         options,
         image: Image { width, height, border_policy: options.border_policy },
-        whole_points: points.has_whole_points(normals),
+        whole_points: output.is_some_and(|(_, normals)| points.has_whole_points(normals)),
         spacing: if is_depth { spacing(points) } else { 0.0 },
         strips,
         per_slice: slice_rows.div_ceil(height / strips).min(strips),
@@ -244,9 +243,12 @@ fn compute_slices(
     for scratch in &each[..workers.count()] {
         let WorkerScratch { windows, sums, .. } = &mut *lock(scratch);
         windows.start(points, options, job.row(job.per_slice))?;
-        sums.reserve(&job, true, columns, side)?;
+        if output.is_some() {
+            sums.reserve(&job, true, columns, side)?;
+        }
     }
-    let sink = Sink::new(normals, indices, width, listed)?;
+    let sink = output.map(|(indices, normals)| Sink::new(normals, indices, width, listed));
+    let sink = sink.transpose()?;
     let reach = AtomicUsize::new(0);
     let chunks = chunks(strips, job.per_slice, workers.count());
     let done = workers.share(chunks, |worker, chunks| {
@@ -257,17 +259,20 @@ fn compute_slices(
                 let rows = job.row(slice.start)..job.row(slice.end);
                 job.sweep(windows, rows.clone())?;
                 read(rows, windows.sides(width));
+                let Some(sink) = &sink else { continue };
                 for strip in slice {
                     let rows = job.row(strip)..job.row(strip + 1);
-                    reach.fetch_max(job.tiles(windows, sums, rows, &sink)?, Ordering::Relaxed);
+                    reach.fetch_max(job.tiles(windows, sums, rows, sink)?, Ordering::Relaxed);
                 }
             }
         }
         Ok(())
     });
-    *last_reach = reach.into_inner();
-    if done.is_err() {
-        write_none(normals);
+    if let Some((_, normals)) = output {
+        *last_reach = reach.into_inner();
+        if done.is_err() {
+            write_none(normals);
+        }
     }
     done
 }

@@ -129,16 +129,21 @@ impl DepthChanges {
     pub fn clean_radii(&mut self, width: usize, height: usize) -> Result<&[i16], Error> {
         let DepthChanges { right, below, spoilt, clean_radii } = self;
         refill(spoilt, repeat_n(false, width * height))?;
-        let mut spoil = |columns: Range<usize>, rows: Range<usize>| {
-            for y in rows {
-                spoilt[y * width..][columns.clone()].fill(true);
+        // Both pixels of a change, and those next to them along it.
+        for y in 0..height {
+            let right = &right[y * width..][..width];
+            for y in y.saturating_sub(1)..(y + 2).min(height) {
+                let spoilt = &mut spoilt[y * width..][..width];
+                mark(spoilt, right);
+                mark(&mut spoilt[1..], right);
             }
-        };
-        let around = |at: usize, size: usize| at.saturating_sub(1)..(at + 2).min(size);
-        let rows = right.chunks_mut(width).zip(below.chunks_mut(width)).enumerate();
-        for (y, (right, below)) in rows {
-            for_each_mark(right, |x, _| spoil(x..x + 2, around(y, height)));
-            for_each_mark(below, |x, _| spoil(around(x, width), y..y + 2));
+            let below = &below[y * width..][..width];
+            for y in y..(y + 2).min(height) {
+                let spoilt = &mut spoilt[y * width..][..width];
+                mark(spoilt, below);
+                mark(&mut spoilt[1..], below);
+                mark(spoilt, &below[1..]);
+            }
         }
         // The chessboard distance.
         least_steps(clean_radii, spoilt, (width, height), LARGEST_CLEAN, 1, 1)?;
@@ -170,6 +175,11 @@ fn slope(cloud: &Cloud, rect: &Rect, axis: usize) -> Option<f64> {
     let determinant = xx * yy - xy * xy;
     let slopes = [xd * yy - yd * xy, yd * xx - xd * xy];
     (n >= Plane::FEWEST && determinant > 0.0).then(|| slopes[axis] / determinant)
+}
+
+/// Marks what is marked in the other row too.
+fn mark(row: &mut [bool], other: &[bool]) {
+    row.iter_mut().zip(other).for_each(|(to, mark)| *to |= mark);
 }
 
 /// Calls `visit` with the columns of a row that are marked, and the marks. They are few: most of the row is looked at by

@@ -25,11 +25,11 @@ pub(crate) trait Engine {
     /// The threads.
     fn workers(&self) -> &Workers;
 
-    /// Every pixel's window, and its estimate.
-    fn windows(&mut self, found: &mut Windows) -> Result<(), Error>;
+    /// The size of every pixel's own window, as [`Windows`] has them.
+    fn sizes(&mut self, sizes: &mut Vec<f32>) -> Result<(), Error>;
 
-    /// As [`Engine::windows`], and the even windows of all blocks, with their estimates if the method is CM.
-    fn windows_and_even(
+    /// The even windows of all blocks; with their estimates, and those of the samples, if the method is CM.
+    fn even_windows(
         &mut self,
         cloud: &Cloud,
         asked: &Asked,
@@ -51,18 +51,21 @@ pub(crate) trait Engine {
 /// The windows, and what they give.
 #[derive(Debug, Default)]
 pub(crate) struct Windows {
-    /// Of the first pass, pixel by pixel, whole numbers: 0 for none, as a radius, or in PCL's semantics as a side.
+    /// Of the pixels' own, whole numbers: 0 for none, as a radius, or in PCL's semantics as a side.
     pub sizes: Vec<f32>,
-    pub estimates: Vec<[f32; 4]>,
     /// Block by block.
     pub even: Vec<EvenWindow>,
     pub of_even: Vec<[f32; 4]>,
+    /// Around the blocks' middle pixels, by the pixels' own: the radii, 0 for none. Empty if they are not wanted.
+    pub samples: Vec<u32>,
+    pub of_samples: Vec<[f32; 4]>,
 }
 
 impl Windows {
     /// Bytes held.
     fn size(&self) -> usize {
-        bytes(&self.sizes) + bytes(&self.estimates) + bytes(&self.even) + bytes(&self.of_even)
+        let Windows { sizes, even, of_even, samples, of_samples } = self;
+        bytes(sizes) + bytes(even) + bytes(of_even) + bytes(samples) + bytes(of_samples)
     }
 }
 
@@ -101,7 +104,7 @@ impl SecondPass {
             + bytes(&self.taken)
     }
 
-    /// Makes what [`SecondPass::estimate`] gives those of other points.
+    /// Finds which even windows the pixels of other points take, and their estimates.
     pub fn compute(
         &mut self,
         cloud: &Cloud,
@@ -109,8 +112,8 @@ impl SecondPass {
         engine: &mut impl Engine,
     ) -> Result<(), Error> {
         let SecondPass { depth_changes, wanted, windows, normals, concerned, levels, .. } = self;
+        engine.sizes(&mut windows.sizes)?;
         if !asks(options) {
-            engine.windows(windows)?;
             return refill(&mut self.choices, repeat_n(NO_WINDOW, cloud.depths.len()));
         }
         find_depth_changes(depth_changes, cloud, options, engine.workers())?;
@@ -121,71 +124,93 @@ impl SecondPass {
         let limit = options.paper.largest_radius;
         let least_noise = Asked::least_noise(options.paper.alpha);
         let asked = Asked { blocks, wanted, clean, limit, least_noise };
-        engine.windows_and_even(cloud, &asked, windows)?;
+        windows.samples.clear();
         if options.crease_windows {
-            normals.sum(&windows.estimates, &blocks, engine.workers())?;
+            find_samples(windows, cloud, &blocks, options, engine.workers())?;
+        }
+        engine.even_windows(cloud, &asked, windows)?;
+        let is_cm = options.method == Method::CovarianceMatrix;
+        if options.crease_windows {
+            if !is_cm {
+                engine.of_blocks(&blocks, &windows.samples, &mut windows.of_samples)?;
+            }
+            normals.sum(&windows.of_samples, &blocks, engine.workers())?;
         }
         refill(concerned, repeat_n(false, cloud.depths.len()))?;
         refill(levels, repeat_n(0, blocks.count()))?;
-        let concern = Concern { cloud, options, blocks: &blocks, windows, normals };
+        let concern = Concern { cloud, options, blocks: &blocks, sizes: &windows.sizes, normals };
         concern.find(concerned, levels, engine.workers());
+        let of_even = &mut windows.of_even;
         let windows = &windows.even;
         let even = EvenWindows { cloud, asked: &asked, options, concerned, levels, windows };
         engine.choices(&even, &mut self.choices)?;
-        if options.method == Method::CovarianceMatrix {
-            return Ok(());
+        if !is_cm {
+            let taken = &mut self.taken;
+            refill(taken, repeat_n(0, blocks.count()))?;
+            // Marked first, as many pixels take the same.
+            for block in self.choices.iter().filter(|choice| **choice != NO_WINDOW) {
+                taken[*block as usize] = 1;
+            }
+            for (block, radius) in taken.iter_mut().enumerate().filter(|(_, taken)| **taken > 0) {
+                *radius = even.radius(block);
+            }
+            engine.of_blocks(&blocks, taken, of_even)?;
         }
-        let taken = &mut self.taken;
-        refill(taken, repeat_n(0, blocks.count()))?;
-        // Marked first, as many pixels take the same.
-        for block in self.choices.iter().filter(|choice| **choice != NO_WINDOW) {
-            taken[*block as usize] = 1;
+        // A window may have no normal: but for rare ones, those that no pixel takes.
+        let has_none = |block: usize| of_even[block][0].is_nan();
+        if (0..blocks.count()).any(|block| even.radius(block) > 0 && has_none(block)) {
+            let choices = self.choices.iter_mut().filter(|choice| **choice != NO_WINDOW);
+            for choice in choices.filter(|choice| has_none(**choice as usize)) {
+                *choice = NO_WINDOW;
+            }
         }
-        for (block, radius) in taken.iter_mut().enumerate().filter(|(_, taken)| **taken > 0) {
-            *radius = even.radius(block);
-        }
-        engine.of_blocks(&blocks, taken, &mut self.windows.of_even)
+        Ok(())
     }
 
-    /// The estimate of a pixel, turned to the viewpoint: near depth changes and near creases from even windows, as the
-    /// options ask.
-    pub fn estimate(&self, cloud: &Cloud, options: &Options, at: usize) -> Estimate {
-        let found: Estimate = (*self.found(at)).into();
-        if found.normal[0].is_nan() {
-            return self.estimate_around(cloud, options, at);
-        }
-        // What the first pass found is turned already.
+    /// The sizes of the pixels' own windows, as [`Windows`] has them.
+    pub fn sizes(&self) -> &[f32] {
+        &self.windows.sizes
+    }
+
+    /// The blocks whose even windows the pixels take, or [`NO_WINDOW`]: then what counts is the own one.
+    pub fn choices(&self) -> &[u32] {
+        &self.choices
+    }
+
+    /// The estimates of the even windows that pixels take, turned to the viewpoint from the blocks' middle pixels.
+    pub fn of_even(&self) -> &[[f32; 4]] {
+        &self.windows.of_even
+    }
+
+    /// The estimate of a pixel, turned to the viewpoint, that takes an even window.
+    pub fn chosen(&self, cloud: &Cloud, options: &Options, at: usize) -> Option<Estimate> {
+        let choice = Some(self.choices[at]).filter(|choice| *choice != NO_WINDOW)?;
+        let found: Estimate = self.windows.of_even[choice as usize].into();
         let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
-        Estimate { normal, ..found }
+        Some(Estimate { normal, ..found })
     }
 
-    /// What the window that a pixel takes gave, or without one the first pass.
-    #[inline(always)]
-    pub fn found(&self, at: usize) -> &[f32; 4] {
-        let choice = self.choices[at];
-        if choice == NO_WINDOW {
-            &self.windows.estimates[at]
-        } else {
-            &self.windows.of_even[choice as usize]
-        }
-    }
-
-    /// The estimate of a pixel whose window has no normal.
-    fn estimate_around(&self, cloud: &Cloud, options: &Options, at: usize) -> Estimate {
-        let first = self.windows.estimates[at];
-        if !first[0].is_nan() || !options.one_sided_windows || cloud.is_missing(at) {
-            return first.into();
+    /// The estimate of a pixel that has a point but no normal, as `has_normal` says if no even window gave one: that of the
+    /// plane through the points around it.
+    pub fn estimate_around(
+        &self,
+        cloud: &Cloud,
+        options: &Options,
+        at: usize,
+        has_normal: impl FnOnce() -> bool,
+    ) -> Option<Estimate> {
+        if self.choices[at] != NO_WINDOW || cloud.is_missing(at) || has_normal() {
+            return None;
         }
         let pixel = (at % cloud.width, at / cloud.width);
         let same = |depth: f32, difference: f32, distance: usize| {
             !is_depth_change(depth, difference, distance.max(1), options)
         };
-        let Some(found) = surroundings::plane_around(cloud, pixel, same) else {
-            return first.into();
-        };
+        let found = surroundings::plane_around(cloud, pixel, same)?;
         let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
         let has_curvature = options.method == Method::CovarianceMatrix;
-        Estimate { normal, curvature: if has_curvature { found.curvature } else { f32::NAN } }
+        let curvature = if has_curvature { found.curvature } else { f32::NAN };
+        Some(Estimate { normal, curvature })
     }
 }
 
@@ -194,7 +219,8 @@ struct Concern<'a> {
     cloud: &'a Cloud,
     options: &'a Options,
     blocks: &'a Blocks,
-    windows: &'a Windows,
+    /// As [`Windows`] has them.
+    sizes: &'a [f32],
     normals: &'a SummedNormals,
 }
 
@@ -214,24 +240,21 @@ impl Concern<'_> {
         });
     }
 
-    /// Marks the pixels from `first` on whose windows are smaller than their depths ask for, or have no normal.
+    /// Marks the pixels from `first` on whose windows are smaller than their depths ask for.
     fn find_one_sided(&self, concerned: &mut [bool], first: usize) {
-        let &Concern { cloud, windows: Windows { sizes, estimates, .. }, .. } = self;
+        let &Concern { cloud, sizes, .. } = self;
         // The loop's own: it is vectorized.
         let options = self.options.clone();
-        let found = sizes[first..].iter().zip(&estimates[first..]);
-        for ((to, depth), (size, [x, ..])) in
-            concerned.iter_mut().zip(&cloud.depths[first..]).zip(found)
-        {
+        let found = cloud.depths[first..].iter().zip(&sizes[first..]);
+        for (to, (depth, size)) in concerned.iter_mut().zip(found) {
             // Sizes are whole numbers.
-            let is_short = size + 1.0 <= wanted_size(*depth, &options);
-            *to = is_short | (x.is_nan() & !depth.is_nan());
+            *to = size + 1.0 <= wanted_size(*depth, &options);
         }
     }
 
     /// The level of a block; marks its pixels near creases. `concerned` starts with pixel number `first`.
     fn level(&self, pixels: [usize; BLOCK * BLOCK], first: usize, concerned: &mut [bool]) -> u8 {
-        let &Concern { cloud, options, windows: Windows { sizes, .. }, .. } = self;
+        let &Concern { cloud, options, sizes, .. } = self;
         let has_window = |at: &usize| sizes[*at] > 0.0;
         let is_concerned = |at: &usize| concerned[at - first];
         let is_one_sided = options.one_sided_windows && pixels.iter().any(is_concerned);
@@ -245,8 +268,8 @@ impl Concern<'_> {
         if !(options.crease_windows && with_window().is_some_and(normals_vary)) {
             return level;
         }
-        for at in pixels.into_iter().filter(has_window) {
-            concerned[at - first] = true;
+        for at in pixels {
+            concerned[at - first] |= has_window(&at);
         }
         CREASE_LEVELS.max(level)
     }
@@ -282,12 +305,42 @@ fn find_wanted(
     Ok(())
 }
 
+/// Where the normals of the first pass are looked at: around the middle pixels of the blocks that have one, windows of the
+/// smallest radius that the middle or a corner of the block has.
+fn find_samples(
+    windows: &mut Windows,
+    cloud: &Cloud,
+    blocks: &Blocks,
+    options: &Options,
+    workers: &Workers,
+) -> Result<(), Error> {
+    let Windows { sizes, samples, .. } = windows;
+    refill(samples, repeat_n(0, blocks.count()))?;
+    workers.each(samples.chunks_mut(blocks.across).enumerate(), |(row, samples)| {
+        for (column, sample) in samples.iter_mut().enumerate() {
+            let pixels = blocks.pixels((column, row));
+            let middle = pixels[MIDDLE * BLOCK + MIDDLE];
+            let is_cut = column * BLOCK + MIDDLE >= cloud.width;
+            if !is_cut && !cloud.is_missing(middle) {
+                let mut least = f32::INFINITY;
+                for place in [0, BLOCK - 1, BLOCK * (BLOCK - 1), BLOCK * BLOCK - 1] {
+                    let size = sizes[pixels[place]];
+                    least = if size > 0.0 && size < least { size } else { least };
+                }
+                let size = if least < sizes[middle] { least } else { sizes[middle] };
+                *sample = radius_of_size(size, options).max(1);
+            }
+        }
+    });
+    Ok(())
+}
+
 /// Whether the options ask for a second pass.
 fn asks(options: &Options) -> bool {
     options.one_sided_windows || options.crease_windows
 }
 
-/// The size that the window of a pixel of this depth has far from any depth change, as [`Engine::windows`] gives them but for
+/// The size that the window of a pixel of this depth has far from any depth change, as [`Windows`] has them but for
 /// a fraction.
 fn wanted_size(depth: f32, options: &Options) -> f32 {
     match options.semantics {
@@ -296,7 +349,7 @@ fn wanted_size(depth: f32, options: &Options) -> f32 {
     }
 }
 
-/// The radius of a window of a size as [`Engine::windows`] gives them.
+/// The radius of a window of a size as [`Windows`] has them.
 fn radius_of_size(size: f32, options: &Options) -> u32 {
     match options.semantics {
         Semantics::Paper => size as u32,
@@ -305,7 +358,7 @@ fn radius_of_size(size: f32, options: &Options) -> u32 {
 }
 
 /// What the windows of the pixels next to one, as many as are in a block, cover of the image, if they have its size, as
-/// [`Engine::windows`] gives them.
+/// [`Windows`] has them.
 fn windows_of_block(cloud: &Cloud, options: &Options, at: usize, size: f32) -> Rect {
     let (width, height) = (cloud.width, cloud.height);
     let (pixel, size) = ((at % width, at / width), size as usize);

@@ -8,13 +8,12 @@ use super::windows::least_depth_change;
 use crate::Error;
 use crate::fast::arithmetic::{Floats, dot};
 use crate::fast::lanes::{LANES, Lanes};
-use crate::fast::tile::Bits;
 use crate::fast::windows::threshold;
 use crate::memory::{bytes, make_room, refill, resize};
 use crate::options::{Options, Semantics};
 use crate::paper::{
     ALIKE, BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows,
-    JITTER, MIDDLE, MISFIT, NEAR, NEAR_NOISE, NEXT, REACH, inverse_depth, places_at,
+    JITTER, MIDDLE, MISFIT, NEAR, NEAR_NOISE, NEXT, NO_WINDOW, REACH, inverse_depth, places_at,
 };
 use crate::simd::{Along, Groups, Simd, load_by_fours};
 
@@ -375,21 +374,23 @@ impl<S: Along> Found<'_, S> {
         }
     }
 
-    /// The blocks whose windows have these numbers, or any where there is none.
+    /// The blocks whose windows have these numbers, or any where there is none, as the bits of floats.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn places(&self, numbers: Floats<S>) -> [u32; LANES] {
-        let (mut of_lanes, mut places) = ([0; LANES], [0; LANES]);
-        // SAFETY: as the caller's; the array holds so many lanes.
-        unsafe { S::store_i(of_lanes.as_mut_ptr(), S::truncate_i(numbers.0)) };
-        for lane in 0..S::LANES {
-            if let Some(windows) = self.candidates.get(of_lanes[lane] as usize) {
-                places[lane] = windows.places[lane];
+    unsafe fn places(&self, numbers: Floats<S>) -> S::F {
+        let (mut of_lanes, mut places) = ([0; LANES], Lanes::ZERO);
+        // SAFETY: as the caller's; the arrays hold so many lanes.
+        unsafe {
+            S::store_i(of_lanes.as_mut_ptr(), S::truncate_i(numbers.0));
+            for lane in 0..S::LANES {
+                if let Some(windows) = self.candidates.get(of_lanes[lane] as usize) {
+                    places.0[lane] = f32::from_bits(windows.places[lane]);
+                }
             }
+            places.load::<S>()
         }
-        places
     }
 
     /// The mask of the blocks whose windows say that depths are exact.
@@ -565,7 +566,10 @@ impl Group<'_> {
             }
             let (second_best, second_windows) = found.best(&second);
             let crease = Crease::between(&first_windows, &second_windows, found.noise);
-            let taken = [found.places(first_best), found.places(second_best)];
+            let first_places = found.places(first_best);
+            let second_places = found.places(second_best);
+            let none = S::splat(f32::from_bits(NO_WINDOW));
+            let mut taken = [none; BLOCK * BLOCK];
             for ((number, own), first_cost) in pixels.iter().enumerate().zip(first_costs) {
                 let second_cost = second_windows.cost(own, found.noise);
                 let (alike, times) = (Floats::splat(ALIKE), Floats::splat(ALIKE * CREASE_COST));
@@ -582,12 +586,22 @@ impl Group<'_> {
                 let takes_second = S::and_not(S::eq(own.number.0, first.number.0), takes_second);
                 let takes_second = S::or(takes_second, S::eq(own.number.0, second.number.0));
                 let cost = S::select(takes_second, second_cost.0, first_cost.0);
-                let takes_some = S::bits(S::and(own.there.0, S::lt(cost, S::splat(f32::INFINITY))));
-                let takes_second = S::bits(takes_second);
-                let row = number / BLOCK * width + number % BLOCK;
-                for lane in Bits(takes_some) {
-                    let place = taken[(takes_second >> lane & 1) as usize][lane];
-                    choices[row + columns[lane]] = place;
+                let takes_some = S::and(own.there.0, S::lt(cost, S::splat(f32::INFINITY)));
+                let place = S::select(takes_second, second_places, first_places);
+                taken[number] = S::select(takes_some, place, none);
+            }
+            for (line, choices) in choices.chunks_mut(width).enumerate() {
+                let mut of_blocks = [Lanes::ZERO; BLOCK];
+                let columns_of_line = std::array::from_fn(|column| taken[line * BLOCK + column]);
+                for (to, fours) in of_blocks.iter_mut().zip(S::transpose_fours(columns_of_line)) {
+                    S::store(to.0.as_mut_ptr(), fours);
+                }
+                for lane in 0..blocks {
+                    // Four of the first lane, then of the fourth next to it; between them those of the lanes between.
+                    let four = &of_blocks[lane % 4].0[lane / 4 * 4..][..BLOCK];
+                    for (to, place) in choices[columns[lane]..].iter_mut().zip(four) {
+                        *to = place.to_bits();
+                    }
                 }
             }
         }
@@ -809,8 +823,15 @@ impl Rows {
             let means = &mut means[line * *length + 1..];
             for x in (0..clean.len()).step_by(S::LANES) {
                 let mut own_clean = Lanes::ZERO;
-                for (to, clean) in own_clean.0[..S::LANES].iter_mut().zip(&clean[x..]) {
-                    *to = (*clean).into();
+                if let Some(clean) = clean.get(x..x + S::LANES) {
+                    // So many are converted together.
+                    for lane in 0..S::LANES {
+                        own_clean.0[lane] = clean[lane].into();
+                    }
+                } else {
+                    for (to, clean) in own_clean.0.iter_mut().zip(&clean[x..]) {
+                        *to = (*clean).into();
+                    }
                 }
                 let is_clean = S::lt(S::splat(0.0), own_clean.load::<S>());
                 let [left, own, right] =

@@ -32,16 +32,14 @@ pub(super) struct Even<'a> {
     pub asked: &'a Asked<'a>,
     /// Block by block.
     pub windows: Parts<EvenWindow>,
-    /// For the normals of the pixels and of the blocks, where they are asked for.
-    pub of_pixels: Option<Sink<'a>>,
-    pub of_blocks: Option<Sink<'a>>,
+    /// For their normals, and for those of windows of the tile's radii, where they are asked for.
+    pub of_even: Option<Sink<'a>>,
+    pub of_samples: Option<Sink<'a>>,
 }
 
 /// A rectangle of the image whose blocks' even windows are found together.
 pub(super) struct EvenTile<'a, F> {
     pub even: &'a Even<'a>,
-    /// The pixels, with windows of their own, and the blocks.
-    pub pixels: Tile<'a, F>,
     pub blocks: Tile<'a, F>,
 }
 
@@ -134,7 +132,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
     /// as [`Tile::compute`].
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`; no one else writes the tile's blocks and pixels.
+    /// The processor has the instruction set of `S`; no one else writes the tile's blocks.
     #[inline(always)]
     pub unsafe fn compute<S: Groups>(
         &self,
@@ -142,33 +140,28 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
         layer: &Layer,
         waiting: &mut Waiting,
     ) -> Option<f32> {
-        let tile = &self.pixels;
+        let tile = &self.blocks;
         let method = CovarianceMatrix::about(layer.origin);
         // SAFETY: as the caller's.
         let mut next = unsafe { tile.start::<S, CovarianceMatrix, MOMENTS>(rings, layer) };
         tile.start_waiting(layer, waiting);
-        let (mut of_pixels, mut of_blocks) = (Run::default(), Run::default());
-        let mut blocks_wait = false;
-        for y in tile.rows.clone() {
-            let has_blocks = y == middle(y - y % BLOCK, BLOCK, self.even.cloud.height);
-            if !has_blocks && self.even.of_pixels.is_none() {
-                continue;
-            }
+        let (mut of_samples, mut of_even) = (Run::default(), Run::default());
+        let mut some_wait = false;
+        for first in tile.rows.clone().step_by(BLOCK) {
+            let y = middle(first, BLOCK, self.even.cloud.height);
             // SAFETY: as the caller's.
             unsafe {
                 let error = tile.advance::<S, _, MOMENTS>(&method, rings, &mut next, y);
-                if let Some(sink) = &self.even.of_pixels {
-                    let run = &mut of_pixels;
+                if let Some(sink) = &self.even.of_samples {
+                    let run = &mut of_samples;
                     tile.row::<S, CovarianceMatrix, MOMENTS, true>(
-                        rings, waiting, sink, run, y, error,
+                        rings, waiting, sink, run, first, error,
                     );
                 }
-                if has_blocks {
-                    blocks_wait |= self.row::<S>(rings, &method, &mut of_blocks, y, error);
-                }
+                some_wait |= self.row::<S>(rings, &method, &mut of_even, y, error);
             }
         }
-        let some_wait = blocks_wait || self.even.of_pixels.is_some() && waiting.is_any();
+        some_wait |= self.even.of_samples.is_some() && waiting.is_any();
         (layer.hides_some() && some_wait).then_some(rings.nearest_hidden)
     }
 
@@ -213,7 +206,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
                     let (found, hidden) =
                         self.eight::<S>(rings, method, &eight, windows, run, group);
                     some_wait |= hidden != 0;
-                    if self.even.of_blocks.is_some() && found != 0 {
+                    if self.even.of_even.is_some() && found != 0 {
                         let at = group * GROUP;
                         run.lanes[at / LANES] |= found << (at % LANES);
                         let own = points.at(rings.place(pixels.x));
@@ -222,7 +215,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
                     }
                 }
             }
-            if let Some(sink) = &self.even.of_blocks {
+            if let Some(sink) = &self.even.of_even {
                 // SAFETY: as the caller's.
                 unsafe {
                     let first = y - y % BLOCK;

@@ -3,9 +3,9 @@
 //! `methods`) and the normals (`tile`).
 
 mod choices;
+mod chosen;
 mod depths;
 mod even_windows;
-mod found;
 mod integrals;
 mod layers;
 mod methods;
@@ -17,9 +17,9 @@ mod windows;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
+use chosen::ChosenRow;
 use depths::row_length;
 use even_windows::{Even, EvenTile};
-use found::FoundRow;
 use integrals::{Rings, elements_of_rings, presence_of_rings, reached, rows_of_rings};
 use layers::{Layer, Waiting};
 use methods::{CovarianceMatrix, Gradients, MOMENTS, SmoothedDepthChanges};
@@ -35,7 +35,9 @@ use crate::cloud::{Normals, PointRow, Points};
 use crate::isa::Isa;
 use crate::memory::{bytes, make_room, resize};
 use crate::options::{DistanceMetric, Method, Options, Semantics};
-use crate::paper::{Asked, BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, PaperMaps, SecondPass};
+use crate::paper::{
+    Asked, BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, NO_WINDOW, PaperMaps, SecondPass,
+};
 use crate::simd::{GROUP, Groups};
 use crate::threads::Workers;
 
@@ -61,13 +63,15 @@ pub(crate) struct Scratch {
     /// Row by row the least and the largest of their magnitudes.
     ranges: Vec<[f32; 2]>,
     radii: Buffer<f32>,
+    radii_of_blocks: Buffer<f32>,
     chunks: Vec<Chunk>,
 }
 
 impl Scratch {
     /// Bytes held.
     pub fn size(&self) -> usize {
-        self.depths.size() + bytes(&self.ranges) + self.radii.size() + bytes(&self.chunks)
+        let Scratch { depths, ranges, radii, radii_of_blocks, chunks } = self;
+        depths.size() + bytes(ranges) + radii.size() + radii_of_blocks.size() + bytes(chunks)
     }
 }
 
@@ -96,67 +100,78 @@ impl WorkerScratch {
 
 /// The normals of the pixels that `indices` list, or of all.
 pub(crate) fn compute(
-    isa: Isa,
-    points: &Points,
-    options: &Options,
+    job: &Job,
     indices: Option<&[i32]>,
     normals: &Normals,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
-    let job = Job::new(isa, points, options, normals);
     job.depths(scratch)?;
     let largest = job.radii(scratch)?;
     job.tiles(scratch, indices, normals, largest, 1)
 }
 
-/// The radii of all pixels' windows, row by row, 0 for none, and their normals.
-pub(crate) fn compute_with_radii(
-    isa: Isa,
-    points: &Points,
-    options: &Options,
-    normals: &Normals,
-    radii: &mut Vec<f32>,
+/// The radii of all pixels' windows, row by row, 0 for none.
+pub(crate) fn radii(
+    job: &Job,
+    found: &mut Vec<f32>,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
-    compute(isa, points, options, None, normals, scratch)?;
-    read_radii(points, radii, &scratch.paper)
-}
-
-/// Reads the radii of all pixels' windows, which have been found.
-fn read_radii(points: &Points, radii: &mut Vec<f32>, scratch: &Scratch) -> Result<(), Error> {
+    let &Job { points, .. } = job;
+    job.depths(scratch)?;
+    job.radii(scratch)?;
     let length = row_length(points.width());
-    let Scratch { chunks, radii: map, .. } = scratch;
-    make_room(radii, points.width() * points.height())?;
+    let Scratch { chunks, radii: map, .. } = &scratch.paper;
+    make_room(found, points.width() * points.height())?;
     for place in chunks.iter().flat_map(|chunk| chunk.own.clone().map(|y| chunk.place(y))) {
-        radii.extend_from_slice(&map[place * length..][..points.width()]);
+        found.extend_from_slice(&map[place * length..][..points.width()]);
     }
     Ok(())
+}
+
+/// As [`compute`], of the pixels that take no even window; the others are not written. Their windows are those that [`radii`]
+/// has found.
+pub(crate) fn compute_own(
+    job: &Job,
+    choices: &[u32],
+    indices: Option<&[i32]>,
+    normals: &Normals,
+    scratch: &mut super::Scratch,
+) -> Result<(), Error> {
+    let largest = job.own_radii(scratch, choices);
+    job.tiles(scratch, indices, normals, largest, 1)
+}
+
+/// Writes the normals of the pixels that take even windows.
+pub(crate) fn write_chosen(
+    job: &Job,
+    second_pass: &SecondPass,
+    cloud: &Cloud,
+    normals: &Normals,
+    workers: &Workers,
+) {
+    let options = job.options;
+    workers.for_each(cloud.height, |_, y| {
+        let row = ChosenRow { cloud, options, second_pass, normals, y };
+        // SAFETY: the processor has the instruction set, and every row falls to one thread.
+        unsafe { paths::run(job.isa, ChosenTask { row }) };
+    });
 }
 
 /// The normals of the blocks whose middle pixel has a window of one of these radii; NaN for the others. The depths are those
 /// that [`even_windows`] has read.
 pub(crate) fn compute_of_blocks(
-    isa: Isa,
-    points: &Points,
-    options: &Options,
+    job: &Job,
     radii: &[u32],
     normals: &Normals,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
-    let job = Job::new(isa, points, options, normals);
-    let largest = job.given_radii(scratch, radii)?;
+    let largest = job.radii_of_blocks(scratch, radii)?;
     job.tiles(scratch, None, normals, largest, BLOCK)
 }
 
-/// Makes a cloud that of these points, as [`Cloud::read`]. `whole_points` as [`Points::has_whole_points`] says.
-pub(crate) fn read_cloud(
-    isa: Isa,
-    points: &Points,
-    whole_points: bool,
-    options: &Options,
-    cloud: &mut Cloud,
-    workers: &Workers,
-) -> Result<(), Error> {
+/// Makes a cloud that of the job's points, as [`Cloud::read`].
+pub(crate) fn read_cloud(job: &Job, cloud: &mut Cloud, workers: &Workers) -> Result<(), Error> {
+    let &Job { isa, points, options, whole_points } = job;
     cloud.resize(points, options)?;
     let range = cloud.has_range;
     let width = points.width();
@@ -169,58 +184,36 @@ pub(crate) fn read_cloud(
     Ok(())
 }
 
-/// Writes what both passes found for all pixels.
-pub(crate) fn write_found(
-    isa: Isa,
-    second_pass: &SecondPass,
-    cloud: &Cloud,
-    options: &Options,
-    normals: &Normals,
-    workers: &Workers,
-) {
-    workers.for_each(cloud.height, |_, y| {
-        let row = FoundRow { cloud, options, second_pass, normals, y };
-        // SAFETY: the processor has the instruction set, and every row falls to one thread.
-        unsafe { paths::run(isa, FoundTask { row }) };
-    });
-}
-
-/// What is found along with even windows.
+/// Normals that are found along with even windows, by CM.
 pub(crate) struct Along<'a> {
-    /// The normals of all pixels, if the radii of their windows are wanted as well, as [`compute_with_radii`] gives them; in
-    /// the paper's semantics.
-    pub pixels: &'a Normals<'a>,
-    pub radii: Option<&'a mut Vec<f32>>,
-    /// The normals of the even windows.
-    pub blocks: Option<&'a Normals<'a>>,
+    /// Those of the even windows.
+    pub of_even: &'a Normals<'a>,
+    /// Those of other windows around the same pixels, of these radii, block by block, if there are some.
+    pub samples: &'a [u32],
+    pub of_samples: &'a Normals<'a>,
 }
 
-/// The even windows of all blocks, and normals by CM. In the paper's semantics without radii, the pixels' windows have been
-/// found already, by [`compute_with_radii`].
+/// The even windows of all blocks; the job's method is CM. In the paper's semantics the depths are those that [`radii`] has
+/// read.
 pub(crate) fn even_windows(
-    isa: Isa,
-    points: &Points,
-    options: &Options,
+    job: &Job,
     (cloud, asked): (&Cloud, &Asked),
     windows: &mut Vec<EvenWindow>,
-    along: Along,
+    along: Option<Along>,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
-    let Along { pixels, radii, blocks } = along;
-    let job = Job::new(isa, points, options, pixels);
-    if radii.is_some() || options.semantics == Semantics::Pcl {
+    if job.options.semantics == Semantics::Pcl {
         job.depths(scratch)?;
     }
-    let of_pixels = if radii.is_some() { job.radii(scratch)? } else { 0 };
     resize(windows, asked.blocks.count(), EvenWindow::default())?;
-    let of_blocks = (0..windows.len()).map(|block| asked.largest(block));
-    let largest = of_pixels.max(of_blocks.max().unwrap_or(0) as usize);
+    let largest = (0..windows.len()).map(|block| asked.largest(block)).max().unwrap_or(0) as usize;
+    let samples = along.as_ref().map_or(&[][..], |along| along.samples);
+    let largest = job.radii_of_blocks(scratch, samples)?.max(largest);
     let windows = Parts(windows.as_mut_ptr());
-    let (of_pixels, of_blocks) = (radii.is_some().then_some(pixels), blocks);
-    let [of_pixels, of_blocks] = [of_pixels, of_blocks].map(|normals| normals.map(Sink::All));
-    let even = Even { cloud, asked, windows, of_pixels, of_blocks };
-    job.even_tiles(scratch, &even, largest)?;
-    radii.map_or(Ok(()), |radii| read_radii(points, radii, &scratch.paper))
+    let of_even = along.as_ref().map(|along| Sink::All(along.of_even));
+    let of_samples = along.as_ref().filter(|along| !along.samples.is_empty());
+    let of_samples = of_samples.map(|along| Sink::All(along.of_samples));
+    job.even_tiles(scratch, &Even { cloud, asked, windows, of_even, of_samples }, largest)
 }
 
 /// The block whose even window each pixel takes, where there is one; the others' choices stay.
@@ -330,19 +323,17 @@ impl Grid {
 }
 
 /// One computation.
-struct Job<'a> {
-    isa: Isa,
-    points: &'a Points<'a>,
-    options: &'a Options,
-    whole_points: bool,
+#[derive(Clone, Copy)]
+pub(crate) struct Job<'a> {
+    pub isa: Isa,
+    pub points: &'a Points<'a>,
+    pub options: &'a Options,
+    /// As [`Points::has_whole_points`] says.
+    pub whole_points: bool,
 }
 
 // The stages are not inlined: profiles and the test of instruction counts tell them by name.
-impl<'a> Job<'a> {
-    fn new(isa: Isa, points: &'a Points<'a>, options: &'a Options, normals: &Normals) -> Self {
-        Job { isa, points, options, whole_points: points.has_whole_points(normals) }
-    }
-
+impl Job<'_> {
     /// All rows of depths.
     #[inline(never)]
     fn depths(&self, scratch: &mut super::Scratch) -> Result<(), Error> {
@@ -407,12 +398,32 @@ impl<'a> Job<'a> {
         Ok(largest.into_inner() as usize)
     }
 
-    /// As [`Job::radii`], of radii of blocks that are there.
-    fn given_radii(&self, scratch: &mut super::Scratch, given: &[u32]) -> Result<usize, Error> {
-        let Scratch { radii, chunks, .. } = &mut scratch.paper;
+    /// Leaves out the pixels that take another window; gives the largest radius of the others.
+    fn own_radii(&self, scratch: &mut super::Scratch, choices: &[u32]) -> usize {
+        let width = self.points.width();
+        let length = row_length(width);
+        let super::Scratch { workers, paper: Scratch { radii, chunks, .. }, .. } = scratch;
+        let largest = AtomicU32::new(0);
+        let parts = Parts(radii.as_mut_ptr());
+        workers.for_each(self.points.height(), |_, y| {
+            let at = place_of(chunks, y) * length;
+            // SAFETY: each row is one thread's.
+            let row = unsafe { parts.part(at..at + width) };
+            let mut most = 0.0;
+            for (radius, choice) in row.iter_mut().zip(&choices[y * width..]) {
+                *radius = if *choice == NO_WINDOW { *radius } else { -1.0 };
+                most = if *radius > most { *radius } else { most };
+            }
+            largest.fetch_max(most as u32, Ordering::Relaxed);
+        });
+        largest.into_inner() as usize
+    }
+
+    /// Takes over radii of blocks; gives the largest.
+    fn radii_of_blocks(&self, scratch: &mut super::Scratch, given: &[u32]) -> Result<usize, Error> {
+        let radii = &mut scratch.paper.radii_of_blocks;
         let Blocks { across, down, .. } = Blocks::of(self.points.width(), self.points.height());
         let length = row_length(across);
-        share_out(down, 1, down, chunks);
         radii.grow(down * length)?;
         for (to, from) in radii.chunks_mut(length).zip(given.chunks(across)) {
             for (to, from) in to.iter_mut().zip(from) {
@@ -420,6 +431,19 @@ impl<'a> Job<'a> {
             }
         }
         Ok(given.iter().max().map_or(0, |largest| *largest as usize))
+    }
+
+    /// A row's depths, and the radii of the windows of the blocks of `step` x `step` pixels that start in it.
+    fn row<'s>(&self, scratch: &'s Scratch, step: usize, y: usize) -> (&'s [f32], &'s [f32]) {
+        let width = self.points.width();
+        let [length, length_of_radii] = [width, width.div_ceil(step)].map(row_length);
+        let Scratch { depths, radii, radii_of_blocks, chunks, .. } = scratch;
+        let radii = if step == 1 {
+            &radii[place_of(chunks, y) * length..]
+        } else {
+            &radii_of_blocks[y / step * length_of_radii..]
+        };
+        (&depths[y * length..][..length], &radii[..length_of_radii])
     }
 
     /// The normals of the middle pixels of blocks of `step` x `step` pixels, tile by tile; no window's radius is above
@@ -436,13 +460,8 @@ impl<'a> Job<'a> {
         let &Job { points, options, whole_points, .. } = self;
         let super::Scratch { workers, each, listed, paper, .. } = scratch;
         let (width, height) = (points.width(), points.height());
-        let [length, radii_length] = [width, width.div_ceil(step)].map(row_length);
         let sink = Sink::new(normals, indices, width, listed)?;
-        let Scratch { depths, ranges, radii, chunks } = &*paper;
-        let row = |y: usize| {
-            let at = place_of(chunks, y / step) * radii_length;
-            (&depths[y * length..][..length], &radii[at..at + radii_length])
-        };
+        let row = |y: usize| self.row(paper, step, y);
         let grid = Grid::new(width, height, largest, column(options.method));
         let limit = options.paper.largest_radius;
         let room = grid.room(limit, elements_of_rings);
@@ -463,7 +482,7 @@ impl<'a> Job<'a> {
             let Some((columns, rows)) = grid.tile(item) else { return };
             let tile = Tile { points, options, columns, rows, whole_points, largest, step, row };
             let scratch = &mut lock(&each[worker]).paper;
-            each_layer(&tile, ranges, span(options.method), |layer| {
+            each_layer(&tile, &paper.ranges, span(options.method), |layer| {
                 let (tile, sink) = (&tile, &sink);
                 // SAFETY: the processor has the instruction set, and tiles do not share pixels.
                 unsafe {
@@ -489,35 +508,21 @@ impl<'a> Job<'a> {
         let &Job { points, options, whole_points, .. } = self;
         let super::Scratch { workers, each, paper, .. } = scratch;
         let (width, height) = (points.width(), points.height());
-        let length = row_length(width);
-        let Scratch { depths, ranges, radii, chunks } = &*paper;
-        let row = |y: usize| {
-            let depths = &depths[y * length..][..length];
-            let radii = if even.of_pixels.is_some() {
-                let at = place_of(chunks, y) * length;
-                &radii[at..at + length]
-            } else {
-                &[]
-            };
-            (depths, radii)
-        };
+        let row = |y: usize| self.row(paper, BLOCK, y);
         let grid = Grid::new(width, height, largest, Rings::<MOMENTS>::COLUMN);
         let room = grid.room(options.paper.largest_radius, elements_of_rings);
         for scratch in &each[..workers.count()] {
             let WorkerScratch { moments, waiting, .. } = &mut lock(scratch).paper;
-            waiting.reserve(width, grid.rows)?;
+            waiting.reserve(width.div_ceil(BLOCK), grid.rows.div_ceil(BLOCK))?;
             moments.reserve(room)?;
         }
         workers.for_each(grid.count(), |worker, item| {
             let Some((columns, rows)) = grid.tile(item) else { return };
-            let tile = |step: usize| {
-                let (columns, rows) = (columns.clone(), rows.clone());
-                Tile { points, options, columns, rows, whole_points, largest, step, row }
-            };
-            let (pixels, blocks) = (tile(1), tile(BLOCK));
-            let tile = EvenTile { even, pixels, blocks };
+            let step = BLOCK;
+            let blocks = Tile { points, options, columns, rows, whole_points, largest, step, row };
+            let tile = EvenTile { even, blocks };
             let WorkerScratch { moments: rings, waiting, .. } = &mut lock(&each[worker]).paper;
-            each_layer(&tile.pixels, ranges, span(Method::CovarianceMatrix), |layer| {
+            each_layer(&tile.blocks, &paper.ranges, span(options.method), |layer| {
                 let tile = &tile;
                 // SAFETY: the processor has the instruction set, and tiles do not share pixels.
                 unsafe { paths::run(self.isa, EvenTask { tile, layer, rings, waiting }) }
@@ -605,12 +610,12 @@ impl Task for PointsTask<'_> {
     }
 }
 
-/// A row of what both passes found; no one else writes it.
-struct FoundTask<'a> {
-    row: FoundRow<'a>,
+/// A row of pixels some of which take even windows; no one else writes it.
+struct ChosenTask<'a> {
+    row: ChosenRow<'a>,
 }
 
-impl Task for FoundTask<'_> {
+impl Task for ChosenTask<'_> {
     type Output = ();
 
     #[inline(always)]

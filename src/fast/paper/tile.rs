@@ -30,8 +30,8 @@ pub(crate) struct Tile<'a, F> {
     pub largest: usize,
     /// Columns and rows of the blocks whose middle pixels get the normals, at most `BLOCK`; the tile starts with one.
     pub step: usize,
-    /// A row's depths, and the radii of its windows, 0 for none, if it has normals; both can be read up to a whole
-    /// group.
+    /// A row's depths, and the radii of its windows, if it has normals: 0 for none, -1 for a pixel whose normal is not
+    /// written. Both can be read up to a whole group.
     pub row: F,
 }
 
@@ -181,7 +181,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let mut rows = Rows::new(rings, 0, M::EDGE);
         for start in self.columns.clone().step_by(RUN * step) {
             run.start = start;
-            run.lanes = [0; RUN / LANES];
+            (run.lanes, run.left_out) = ([0; RUN / LANES], [0; RUN / LANES]);
             let own = [(start - self.columns.start) / step, (y - self.rows.start) / step];
             let all = [u32::MAX; RUN / LANES];
             let is_later = PARTIAL && !layer.is_first;
@@ -196,6 +196,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 unsafe {
                     let eight = S::load(radii[x / step..].as_ptr());
                     let (pair, shift) = (at / LANES, at % LANES);
+                    run.left_out[pair] |= S::bits(S::lt(eight, S::splat(0.0))) << shift;
                     let windows = S::bits(S::lt(S::splat(0.0), eight))
                         & (asked[pair] >> shift)
                         & ((1 << count) - 1);
@@ -249,7 +250,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let (width, height) = (self.points.width(), self.points.height());
         let cleaned =
             Cleaned { points: self.points, zero_is_missing: self.options.zero_is_missing };
-        let Run { start, radii, sums, points, lanes } = run;
+        let Run { start, radii, sums, points, lanes, left_out } = run;
         let end = self.columns.end.min(*start + RUN * step);
         // SAFETY: as the caller's.
         unsafe {
@@ -257,10 +258,9 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
             for (pair, x) in (*start..end).step_by(LANES * step).enumerate() {
                 let (at, windows) = (pair * LANES, lanes[pair]);
                 let count = (end - x).div_ceil(step).min(LANES);
+                let written = if is_later { windows } else { all(count) & !left_out[pair] };
                 if windows == 0 {
-                    if !is_later {
-                        sink.write_none::<S::Pair>(x / step, y / step, count);
-                    }
+                    sink.write::<S::Pair>(x / step, y / step, written, &Estimates::NONE);
                     continue;
                 }
                 let pixel =
@@ -281,7 +281,6 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 for lane in Bits(plain) {
                     normals.put(lane, self.plain(&cleaned, pixel(lane), &rect(lane)));
                 }
-                let written = if is_later { windows } else { all(count) };
                 sink.write::<S::Pair>(x / step, y / step, written, &normals);
             }
         }
@@ -332,13 +331,15 @@ pub(super) struct Run<T> {
     pub radii: [f32; RUN],
     pub sums: T,
     pub points: OfRun<f32, 3>,
-    /// The lanes of each pair of groups that have a window.
+    /// The lanes of each pair of groups that have a window, and those that are not written.
     pub lanes: [u32; RUN / LANES],
+    pub left_out: [u32; RUN / LANES],
 }
 
 impl<T: Default> Default for Run<T> {
     fn default() -> Self {
         let (sums, points) = (T::default(), OfRun::default());
-        Run { start: 0, radii: [0.0; RUN], sums, points, lanes: [0; RUN / LANES] }
+        let none = [0; RUN / LANES];
+        Run { start: 0, radii: [0.0; RUN], sums, points, lanes: none, left_out: none }
     }
 }

@@ -1,0 +1,73 @@
+//! Writes the normals of the pixels of a row that take even windows, fast: the plain form is `SecondPass::chosen`.
+
+use crate::cloud::Normals;
+use crate::fast::arithmetic::Floats;
+use crate::fast::lanes::LANES;
+use crate::fast::tile::{Bits, turned};
+use crate::options::Options;
+use crate::paper::{Cloud, NO_WINDOW, SecondPass};
+use crate::simd::{Along, load_by_fours};
+
+/// A row of pixels, some of which take even windows.
+pub(super) struct ChosenRow<'a> {
+    pub cloud: &'a Cloud,
+    pub options: &'a Options,
+    pub second_pass: &'a SecondPass,
+    pub normals: &'a Normals<'a>,
+    pub y: usize,
+}
+
+impl ChosenRow<'_> {
+    /// Writes them; the others stay as they are.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`; the row is inside the normals, and no other thread writes it.
+    #[inline(always)]
+    pub unsafe fn write<S: Along>(&self) {
+        let &ChosenRow { cloud, options, second_pass, normals, y } = self;
+        let (first, of_even) = (y * cloud.width, second_pass.of_even());
+        let choices = &second_pass.choices()[first..][..cloud.width];
+        let whole = cloud.width / S::LANES * S::LANES;
+        for x in (0..whole).step_by(S::LANES) {
+            let (mut places, mut lanes) = ([0; LANES], 0);
+            for (lane, choice) in choices[x..][..S::LANES].iter().enumerate() {
+                let is_chosen = *choice != NO_WINDOW;
+                places[lane] = if is_chosen { *choice as usize } else { 0 };
+                lanes |= u32::from(is_chosen) << lane;
+            }
+            if lanes == 0 {
+                continue;
+            }
+            // SAFETY: as the caller's; an estimate is four floats, and so many points are there.
+            unsafe {
+                let [nx, ny, nz, curvature] =
+                    load_by_fours::<S>(|lane| of_even[places[lane]].as_ptr());
+                // Read by fours of floats.
+                let points = cloud.points[first + x..][..=S::LANES].as_ptr().cast();
+                let [px, py, pz] = S::load_points(points, size_of::<[f32; 3]>());
+                let normal = [Floats(nx), Floats(ny), Floats(nz)];
+                let [nx, ny, nz] =
+                    turned::<S>(normal, [Floats(px), Floats(py), Floats(pz)], options.viewpoint);
+                let fields = [nx.0, ny.0, nz.0, curvature];
+                if lanes.count_ones() as usize == S::LANES {
+                    normals.write_lanes::<S>(x, y, fields);
+                    continue;
+                }
+                let mut found = [[0.0; LANES]; 4];
+                for (to, field) in found.iter_mut().zip(fields) {
+                    S::store(to.as_mut_ptr(), field);
+                }
+                for lane in Bits(lanes) {
+                    let [nx, ny, nz, curvature] = found.each_ref().map(|field| field[lane]);
+                    normals.write(x + lane, y, [nx, ny, nz], curvature);
+                }
+            }
+        }
+        for x in whole..cloud.width {
+            if let Some(found) = second_pass.chosen(cloud, options, first + x) {
+                // SAFETY: as the caller's.
+                unsafe { normals.write(x, y, found.normal, found.curvature) };
+            }
+        }
+    }
+}
