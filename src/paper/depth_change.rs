@@ -186,13 +186,9 @@ fn mark(row: &mut [bool], other: &[bool]) {
 /// sixteens.
 fn for_each_mark(row: &mut [bool], mut visit: impl FnMut(usize, &mut bool)) {
     const TOGETHER: usize = 16;
-    let (all, rest) = row.as_chunks_mut::<TOGETHER>();
-    let start_of_rest = all.len() * TOGETHER;
-    let all = all.iter_mut().map(|some| some.as_mut_slice());
-    let parts = all.zip((0..).step_by(TOGETHER)).chain([(rest, start_of_rest)]);
-    for (part, first) in parts {
-        if part.iter().fold(false, |any, mark| any | mark) {
-            let marks = part.iter_mut().zip(first..).filter(|(mark, _)| **mark);
+    for (some, first) in row.chunks_mut(TOGETHER).zip((0..).step_by(TOGETHER)) {
+        if *some != [false; TOGETHER] {
+            let marks = some.iter_mut().zip(first..).filter(|(mark, _)| **mark);
             marks.for_each(|(mark, x)| visit(x, mark));
         }
     }

@@ -409,12 +409,13 @@ impl Job<'_> {
             let at = place_of(chunks, y) * length;
             // SAFETY: each row is one thread's.
             let row = unsafe { parts.part(at..at + width) };
-            let mut most = 0.0;
+            // As integers, radii are in the same order.
+            let mut most = 0;
             for (radius, choice) in row.iter_mut().zip(&choices[y * width..]) {
                 *radius = if *choice == NO_WINDOW { *radius } else { -1.0 };
-                most = if *radius > most { *radius } else { most };
+                most = most.max(radius.to_bits() as i32);
             }
-            largest.fetch_max(most as u32, Ordering::Relaxed);
+            largest.fetch_max(f32::from_bits(most as u32) as u32, Ordering::Relaxed);
         });
         largest.into_inner() as usize
     }

@@ -30,8 +30,8 @@ pub(crate) struct Tile<'a, F> {
     pub largest: usize,
     /// Columns and rows of the blocks whose middle pixels get the normals, at most `BLOCK`; the tile starts with one.
     pub step: usize,
-    /// A row's depths, and the radii of its windows, if it has normals: 0 for none, -1 for a pixel whose normal is not
-    /// written. Both can be read up to a whole group.
+    /// A row's depths, and the radii of its windows, if it has normals: 0 for none, -1 for a pixel that is left
+    /// out. Both can be read up to a whole group.
     pub row: F,
 }
 
@@ -331,7 +331,7 @@ pub(super) struct Run<T> {
     pub radii: [f32; RUN],
     pub sums: T,
     pub points: OfRun<f32, 3>,
-    /// The lanes of each pair of groups that have a window, and those that are not written.
+    /// The lanes of each pair of groups that have a window, and those that are left out.
     pub lanes: [u32; RUN / LANES],
     pub left_out: [u32; RUN / LANES],
 }
