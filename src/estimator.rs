@@ -132,10 +132,9 @@ impl Estimator {
         indices: Option<&[i32]>,
         normals: &Normals,
     ) -> Result<(), Error> {
-        let Options { semantics, one_sided_windows, crease_windows, .. } = self.options;
         if !self.is_plain(points) {
             let Estimator { ref options, isa, ref mut scratch, .. } = *self;
-            if semantics == Semantics::Paper && !(one_sided_windows || crease_windows) {
+            if options.semantics == Semantics::Paper && !options.has_second_pass() {
                 let whole_points = points.has_whole_points(normals);
                 let job = Job { isa, points, options, whole_points };
                 return fast::paper::compute(&job, indices, normals, scratch);

@@ -238,8 +238,8 @@ impl Options {
             }
             return self.paper.check();
         }
-        if self.one_sided_windows || self.crease_windows {
-            // They ask for alpha and the largest radius.
+        if self.has_second_pass() {
+            // It asks for alpha and the largest radius.
             self.paper.check()?;
         }
         if !(self.normal_smoothing_size.is_finite() && self.normal_smoothing_size > 0.0) {
@@ -253,10 +253,12 @@ impl Options {
 
     /// Whether more than PCL's windows and sums is asked for.
     pub(crate) fn is_beyond_pcl(&self) -> bool {
-        self.semantics != Semantics::Pcl
-            || self.zero_is_missing
-            || self.one_sided_windows
-            || self.crease_windows
+        self.semantics != Semantics::Pcl || self.zero_is_missing || self.has_second_pass()
+    }
+
+    /// Whether some pixels may take other windows than their own.
+    pub(crate) fn has_second_pass(&self) -> bool {
+        self.one_sided_windows || self.crease_windows
     }
 
     /// `BORDER_POLICY_IGNORE`: how many rows and columns at each border get no normal.

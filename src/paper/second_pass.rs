@@ -113,7 +113,7 @@ impl SecondPass {
     ) -> Result<(), Error> {
         let SecondPass { depth_changes, wanted, windows, normals, concerned, levels, .. } = self;
         engine.sizes(&mut windows.sizes)?;
-        if !asks(options) {
+        if !options.has_second_pass() {
             return refill(&mut self.choices, repeat_n(NO_WINDOW, cloud.depths.len()));
         }
         find_depth_changes(depth_changes, cloud, options, engine.workers())?;
@@ -306,7 +306,7 @@ fn find_wanted(
 }
 
 /// Where the normals of the first pass are looked at: around the middle pixels of the blocks that have one, windows of the
-/// smallest radius that the middle or a corner of the block has.
+/// smallest radius that the middle or a corner of the block has; the least there is where the middle has no window.
 fn find_samples(
     windows: &mut Windows,
     cloud: &Cloud,
@@ -322,22 +322,16 @@ fn find_samples(
             let middle = pixels[MIDDLE * BLOCK + MIDDLE];
             let is_cut = column * BLOCK + MIDDLE >= cloud.width;
             if !is_cut && !cloud.is_missing(middle) {
-                let mut least = f32::INFINITY;
+                let mut size = sizes[middle];
                 for place in [0, BLOCK - 1, BLOCK * (BLOCK - 1), BLOCK * BLOCK - 1] {
-                    let size = sizes[pixels[place]];
-                    least = if size > 0.0 && size < least { size } else { least };
+                    let other = sizes[pixels[place]];
+                    size = if other > 0.0 && other < size { other } else { size };
                 }
-                let size = if least < sizes[middle] { least } else { sizes[middle] };
                 *sample = radius_of_size(size, options).max(1);
             }
         }
     });
     Ok(())
-}
-
-/// Whether the options ask for a second pass.
-fn asks(options: &Options) -> bool {
-    options.one_sided_windows || options.crease_windows
 }
 
 /// The size that the window of a pixel of this depth has far from any depth change, as [`Windows`] has them but for
