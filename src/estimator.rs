@@ -458,8 +458,7 @@ impl paper::Engine for Engine<'_> {
             if has_normals {
                 let blocks = &asked.blocks;
                 self.plain_of_blocks(blocks, |block| even[block].radius as u32, of_even)?;
-                let sample = |block: usize| samples.get(block).copied().unwrap_or(0);
-                self.plain_of_blocks(blocks, sample, of_samples)?;
+                self.plain_of_blocks(blocks, |block| samples[block], of_samples)?;
             }
             return Ok(());
         }

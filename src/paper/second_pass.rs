@@ -56,7 +56,7 @@ pub(crate) struct Windows {
     /// Block by block.
     pub even: Vec<EvenWindow>,
     pub of_even: Vec<[f32; 4]>,
-    /// Around the blocks' middle pixels, by the pixels' own: the radii, 0 for none. Empty if they are not wanted.
+    /// Around the blocks' middle pixels, by the pixels' own: the radii, 0 for none.
     pub samples: Vec<u32>,
     pub of_samples: Vec<[f32; 4]>,
 }
@@ -124,10 +124,7 @@ impl SecondPass {
         let limit = options.paper.largest_radius;
         let least_noise = Asked::least_noise(options.paper.alpha);
         let asked = Asked { blocks, wanted, clean, limit, least_noise };
-        windows.samples.clear();
-        if options.crease_windows {
-            find_samples(windows, cloud, &blocks, options, engine.workers())?;
-        }
+        find_samples(windows, cloud, &blocks, options, engine.workers())?;
         engine.even_windows(cloud, &asked, windows)?;
         let is_cm = options.method == Method::CovarianceMatrix;
         if options.crease_windows {
@@ -306,7 +303,8 @@ fn find_wanted(
 }
 
 /// Where the normals of the first pass are looked at: around the middle pixels of the blocks that have one, windows of the
-/// smallest radius that the middle or a corner of the block has; the least there is where the middle has no window.
+/// smallest radius that the middle or a corner of the block has; the least there is where the middle has no window. None
+/// without crease windows.
 fn find_samples(
     windows: &mut Windows,
     cloud: &Cloud,
@@ -316,6 +314,9 @@ fn find_samples(
 ) -> Result<(), Error> {
     let Windows { sizes, samples, .. } = windows;
     refill(samples, repeat_n(0, blocks.count()))?;
+    if !options.crease_windows {
+        return Ok(());
+    }
     workers.each(samples.chunks_mut(blocks.across).enumerate(), |(row, samples)| {
         for (column, sample) in samples.iter_mut().enumerate() {
             let pixels = blocks.pixels((column, row));

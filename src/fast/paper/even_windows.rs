@@ -32,9 +32,8 @@ pub(super) struct Even<'a> {
     pub asked: &'a Asked<'a>,
     /// Block by block.
     pub windows: Parts<EvenWindow>,
-    /// For their normals, and for those of windows of the tile's radii, where they are asked for.
-    pub of_even: Option<Sink<'a>>,
-    pub of_samples: Option<Sink<'a>>,
+    /// For their normals, and for those of windows of the tile's radii, if they are asked for.
+    pub normals: Option<[Sink<'a>; 2]>,
 }
 
 /// A rectangle of the image whose blocks' even windows are found together.
@@ -152,20 +151,20 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
             // SAFETY: as the caller's.
             unsafe {
                 let error = tile.advance::<S, _, MOMENTS>(&method, rings, &mut next, y);
-                if let Some(sink) = &self.even.of_samples {
+                if let Some([_, sink]) = &self.even.normals {
                     let run = &mut of_samples;
                     tile.row::<S, CovarianceMatrix, MOMENTS, true>(
                         rings, waiting, sink, run, first, error,
                     );
                 }
-                some_wait |= self.row::<S>(rings, &method, &mut of_even, y, error);
+                some_wait |= self.row::<S>(rings, &method, &mut of_even, first, error);
             }
         }
-        some_wait |= self.even.of_samples.is_some() && waiting.is_any();
+        some_wait |= self.even.normals.is_some() && waiting.is_any();
         (layer.hides_some() && some_wait).then_some(rings.nearest_hidden)
     }
 
-    /// The windows of the blocks whose middle is row `y`; returns whether some wait for another layer.
+    /// The windows of the blocks that start in row `first`; returns whether some wait for another layer.
     ///
     /// # Safety
     /// As [`EvenTile::compute`]; the rings hold what the windows need.
@@ -175,12 +174,12 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
         rings: &Rings<MOMENTS>,
         method: &CovarianceMatrix,
         run: &mut Run<Matrices>,
-        y: usize,
+        first: usize,
         error: f64,
     ) -> bool {
         let &Cloud { width, .. } = self.even.cloud;
         let Tile { columns, step, .. } = &self.blocks;
-        let points = rings.around(y);
+        let points = rings.around(rings.aimed.y);
         let is_later = !rings.layer.is_first;
         let mut some_wait = false;
         for start in columns.clone().step_by(RUN * step) {
@@ -188,7 +187,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
             run.lanes = [0; RUN / LANES];
             let end = columns.end.min(start + RUN * step);
             for (group, x) in (start..end).step_by(GROUP * step).enumerate() {
-                let block = self.even.asked.blocks.block(y * width + x);
+                let block = self.even.asked.blocks.block(first * width + x);
                 let blocks = block..block + (end - x).div_ceil(*step).min(GROUP);
                 let pixels = Pixels { x: x + MIDDLE, step: *step, width };
                 // SAFETY: as the caller's.
@@ -206,7 +205,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
                     let (found, hidden) =
                         self.eight::<S>(rings, method, &eight, windows, run, group);
                     some_wait |= hidden != 0;
-                    if self.even.of_even.is_some() && found != 0 {
+                    if self.even.normals.is_some() && found != 0 {
                         let at = group * GROUP;
                         run.lanes[at / LANES] |= found << (at % LANES);
                         let own = points.at(rings.place(pixels.x));
@@ -215,10 +214,9 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
                     }
                 }
             }
-            if let Some(sink) = &self.even.of_even {
+            if let Some([sink, _]) = &self.even.normals {
                 // SAFETY: as the caller's.
                 unsafe {
-                    let first = y - y % BLOCK;
                     self.blocks
                         .finish::<S, CovarianceMatrix, MOMENTS>(sink, run, first, error, is_later);
                 }

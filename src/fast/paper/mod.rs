@@ -188,7 +188,7 @@ pub(crate) fn read_cloud(job: &Job, cloud: &mut Cloud, workers: &Workers) -> Res
 pub(crate) struct Along<'a> {
     /// Those of the even windows.
     pub of_even: &'a Normals<'a>,
-    /// Those of other windows around the same pixels, of these radii, block by block, if there are some.
+    /// Those of other windows around the same pixels, of these radii, block by block, 0 for none.
     pub samples: &'a [u32],
     pub of_samples: &'a Normals<'a>,
 }
@@ -210,10 +210,8 @@ pub(crate) fn even_windows(
     let samples = along.as_ref().map_or(&[][..], |along| along.samples);
     let largest = job.radii_of_blocks(scratch, samples)?.max(largest);
     let windows = Parts(windows.as_mut_ptr());
-    let of_even = along.as_ref().map(|along| Sink::All(along.of_even));
-    let of_samples = along.as_ref().filter(|along| !along.samples.is_empty());
-    let of_samples = of_samples.map(|along| Sink::All(along.of_samples));
-    job.even_tiles(scratch, &Even { cloud, asked, windows, of_even, of_samples }, largest)
+    let normals = along.map(|along| [along.of_even, along.of_samples].map(Sink::All));
+    job.even_tiles(scratch, &Even { cloud, asked, windows, normals }, largest)
 }
 
 /// The block whose even window each pixel takes, where there is one; the others' choices stay.
