@@ -289,6 +289,10 @@ impl Estimator {
         let is_pcl = options.semantics == Semantics::Pcl;
         let cleaned = is_pcl.then(|| packed(&cloud.points, cloud.width, cloud.height));
         let points = cleaned.as_ref().unwrap_or(points);
+        // But for zeros, which are left out now, this is as PCL.
+        if !is_plain && !options.has_second_pass() {
+            return fast::compute(isa, points, options, indices, normals, scratch);
+        }
         let job = Job { points, ..job };
         let mut engine = Engine { job, scratch, is_plain };
         second_pass.compute(cloud, options, &mut engine)?;
