@@ -3,6 +3,25 @@
 //! Algorithms are written once, over [`Simd`], in `#[inline(always)]` functions; only the outermost function of a
 //! path is compiled for its instruction set. No operation fuses or reorders, so every path gives the same bits.
 
+/// Applies an intrinsic to each of a group's registers: written out, as compilers take minutes over so many small
+/// loops.
+macro_rules! each {
+    ([$($i:literal)+] $op:path, $a:expr) => {{
+        let a = $a;
+        [$($op(a[$i])),+]
+    }};
+    ([$($i:literal)+] $op:path, $a:expr, $b:expr) => {{
+        let (a, b) = ($a, $b);
+        [$($op(a[$i], b[$i])),+]
+    }};
+    ([$($i:literal)+] $op:path, $a:expr, $b:expr, $c:expr) => {{
+        let (a, b, c) = ($a, $b, $c);
+        [$($op(a[$i], b[$i], c[$i])),+]
+    }};
+    (2 $op:path, $($operand:expr),+) => { each!([0 1] $op, $($operand),+) };
+    (4 $op:path, $($operand:expr),+) => { each!([0 1 2 3] $op, $($operand),+) };
+}
+
 pub(crate) mod portable;
 #[cfg(test)]
 mod tests;

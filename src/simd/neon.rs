@@ -12,55 +12,19 @@ use super::{Along, GROUP, Groups, Simd, load_points_by_fours, store_points_by_la
 #[derive(Clone, Copy)]
 pub(crate) struct Neon;
 
-/// Applies an intrinsic to each of the registers of a group.
-macro_rules! each {
-    ($op:path, $a:expr) => {{
-        let mut registers = $a;
-        for r in &mut registers {
-            *r = $op(*r);
-        }
-        registers
-    }};
-    ($op:path, $a:expr, $b:expr) => {{
-        let (mut registers, b) = ($a, $b);
-        for (r, b) in registers.iter_mut().zip(b) {
-            *r = $op(*r, b);
-        }
-        registers
-    }};
-}
-
 /// `each!` for the bits of floats.
 macro_rules! bitwise {
     ($op:path, $a:expr, $b:expr) => {{
-        let (mut registers, b) = ($a, $b);
-        for (r, b) in registers.iter_mut().zip(b) {
-            *r = vreinterpretq_f32_u32($op(vreinterpretq_u32_f32(*r), vreinterpretq_u32_f32(b)));
-        }
-        registers
-    }};
-}
-
-/// Picks, lane by lane, where a comparison holds: unlike Arm's own minimum and maximum, `b` where one is NaN.
-macro_rules! pick {
-    ($compare:path, $select:path, $a:expr, $b:expr) => {{
-        let (mut registers, b) = ($a, $b);
-        for (r, b) in registers.iter_mut().zip(b) {
-            *r = $select($compare(*r, b), *r, b);
-        }
-        registers
+        let a = each!(2 vreinterpretq_u32_f32, $a);
+        let b = each!(2 vreinterpretq_u32_f32, $b);
+        each!(2 vreinterpretq_f32_u32, each!(2 $op, a, b))
     }};
 }
 
 /// The masks of lanes 0 to 3 and of lanes 4 to 7.
 #[inline(always)]
 unsafe fn lane_masks(lanes: u32) -> [uint32x4_t; 2] {
-    unsafe { each_mask(Neon::mask(lanes)) }
-}
-
-#[inline(always)]
-unsafe fn each_mask(mask: [float32x4_t; 2]) -> [uint32x4_t; 2] {
-    unsafe { [vreinterpretq_u32_f32(mask[0]), vreinterpretq_u32_f32(mask[1])] }
+    unsafe { each!(2 vreinterpretq_u32_f32, Neon::mask(lanes)) }
 }
 
 impl Simd for Neon {
@@ -86,31 +50,31 @@ impl Simd for Neon {
     }
     #[inline(always)]
     unsafe fn add(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(vaddq_f32, a, b) }
+        unsafe { each!(2 vaddq_f32, a, b) }
     }
     #[inline(always)]
     unsafe fn sub(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(vsubq_f32, a, b) }
+        unsafe { each!(2 vsubq_f32, a, b) }
     }
     #[inline(always)]
     unsafe fn mul(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(vmulq_f32, a, b) }
+        unsafe { each!(2 vmulq_f32, a, b) }
     }
     #[inline(always)]
     unsafe fn div(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(vdivq_f32, a, b) }
+        unsafe { each!(2 vdivq_f32, a, b) }
     }
     #[inline(always)]
     unsafe fn sqrt(a: Self::F) -> Self::F {
-        unsafe { each!(vsqrtq_f32, a) }
+        unsafe { each!(2 vsqrtq_f32, a) }
     }
     #[inline(always)]
     unsafe fn min(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { pick!(vcltq_f32, vbslq_f32, a, b) }
+        unsafe { each!(2 vbslq_f32, each!(2 vcltq_f32, a, b), a, b) }
     }
     #[inline(always)]
     unsafe fn max(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { pick!(vcgtq_f32, vbslq_f32, a, b) }
+        unsafe { each!(2 vbslq_f32, each!(2 vcgtq_f32, a, b), a, b) }
     }
     #[inline(always)]
     unsafe fn lt(a: Self::F, b: Self::F) -> Self::F {
@@ -123,12 +87,7 @@ impl Simd for Neon {
     }
     #[inline(always)]
     unsafe fn eq(a: Self::F, b: Self::F) -> Self::F {
-        unsafe {
-            [
-                vreinterpretq_f32_u32(vceqq_f32(a[0], b[0])),
-                vreinterpretq_f32_u32(vceqq_f32(a[1], b[1])),
-            ]
-        }
+        unsafe { each!(2 vreinterpretq_f32_u32, each!(2 vceqq_f32, a, b)) }
     }
     #[inline(always)]
     unsafe fn and(a: Self::F, b: Self::F) -> Self::F {
@@ -151,7 +110,7 @@ impl Simd for Neon {
         const PLACES: [[u32; 4]; 2] = [[1, 2, 4, 8], [16, 32, 64, 128]];
         unsafe {
             // The highest bit of a lane decides, as on other instruction sets.
-            let [low, high] = each_mask(mask);
+            let [low, high] = each!(2 vreinterpretq_u32_f32, mask);
             let spread =
                 |lanes| vreinterpretq_u32_s32(vshrq_n_s32::<31>(vreinterpretq_s32_u32(lanes)));
             let low = vandq_u32(spread(low), vld1q_u32(PLACES[0].as_ptr()));
@@ -177,18 +136,15 @@ impl Simd for Neon {
     }
     #[inline(always)]
     unsafe fn add_i(a: Self::I, b: Self::I) -> Self::I {
-        unsafe { each!(vaddq_s32, a, b) }
+        unsafe { each!(2 vaddq_s32, a, b) }
     }
     #[inline(always)]
     unsafe fn sub_i(a: Self::I, b: Self::I) -> Self::I {
-        unsafe { each!(vsubq_s32, a, b) }
+        unsafe { each!(2 vsubq_s32, a, b) }
     }
     #[inline(always)]
     unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
-        unsafe {
-            let mask = lane_masks(lanes);
-            [vbslq_s32(mask[0], yes[0], no[0]), vbslq_s32(mask[1], yes[1], no[1])]
-        }
+        unsafe { each!(2 vbslq_s32, lane_masks(lanes), yes, no) }
     }
     #[inline(always)]
     unsafe fn round_i(a: Self::F) -> Self::I {
@@ -226,27 +182,27 @@ impl Simd for Neon {
     }
     #[inline(always)]
     unsafe fn add_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(vaddq_f64, a, b) }
+        unsafe { each!(4 vaddq_f64, a, b) }
     }
     #[inline(always)]
     unsafe fn sub_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(vsubq_f64, a, b) }
+        unsafe { each!(4 vsubq_f64, a, b) }
     }
     #[inline(always)]
     unsafe fn mul_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(vmulq_f64, a, b) }
+        unsafe { each!(4 vmulq_f64, a, b) }
     }
     #[inline(always)]
     unsafe fn div_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(vdivq_f64, a, b) }
+        unsafe { each!(4 vdivq_f64, a, b) }
     }
     #[inline(always)]
     unsafe fn sqrt_d(a: Self::D) -> Self::D {
-        unsafe { each!(vsqrtq_f64, a) }
+        unsafe { each!(4 vsqrtq_f64, a) }
     }
     #[inline(always)]
     unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { pick!(vcgtq_f64, vbslq_f64, a, b) }
+        unsafe { each!(4 vbslq_f64, each!(4 vcgtq_f64, a, b), a, b) }
     }
     #[inline(always)]
     unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32 {
@@ -268,11 +224,7 @@ impl Simd for Neon {
                 vreinterpretq_u64_u32(vzip1q_u32(high, high)),
                 vreinterpretq_u64_u32(vzip2q_u32(high, high)),
             ];
-            let mut lanes = no;
-            for i in 0..4 {
-                lanes[i] = vbslq_f64(mask[i], yes[i], no[i]);
-            }
-            lanes
+            each!(4 vbslq_f64, mask, yes, no)
         }
     }
     #[inline(always)]

@@ -11,16 +11,10 @@ type I = [i32; GROUP];
 type D = [f64; GROUP];
 
 #[inline(always)]
-fn zip<A: Copy, B: Copy, C: Copy + Default>(
-    a: [A; GROUP],
-    b: [B; GROUP],
-    f: impl Fn(A, B) -> C,
-) -> [C; GROUP] {
-    let mut lanes = [C::default(); GROUP];
-    for l in 0..GROUP {
-        lanes[l] = f(a[l], b[l]);
-    }
-    lanes
+fn zip<A: Copy, B: Copy, C>(a: [A; GROUP], b: [B; GROUP], f: impl Fn(A, B) -> C) -> [C; GROUP] {
+    // Written out, as `each!`.
+    let f = |lane: usize| f(a[lane], b[lane]);
+    [f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7)]
 }
 
 #[inline(always)]

@@ -16,24 +16,6 @@ pub(crate) struct Sse2;
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2;
 
-/// Applies an intrinsic to each of the registers of a group.
-macro_rules! each {
-    ($op:path, $a:expr) => {{
-        let mut registers = $a;
-        for r in &mut registers {
-            *r = $op(*r);
-        }
-        registers
-    }};
-    ($op:path, $a:expr, $b:expr) => {{
-        let (mut registers, b) = ($a, $b);
-        for (r, b) in registers.iter_mut().zip(b) {
-            *r = $op(*r, b);
-        }
-        registers
-    }};
-}
-
 /// Stores the first two lanes.
 #[inline(always)]
 unsafe fn store_two(to: *mut f32, lanes: __m128) {
@@ -95,55 +77,55 @@ impl Simd for Sse2 {
     }
     #[inline(always)]
     unsafe fn add(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(_mm_add_ps, a, b) }
+        unsafe { each!(2 _mm_add_ps, a, b) }
     }
     #[inline(always)]
     unsafe fn sub(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(_mm_sub_ps, a, b) }
+        unsafe { each!(2 _mm_sub_ps, a, b) }
     }
     #[inline(always)]
     unsafe fn mul(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(_mm_mul_ps, a, b) }
+        unsafe { each!(2 _mm_mul_ps, a, b) }
     }
     #[inline(always)]
     unsafe fn div(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(_mm_div_ps, a, b) }
+        unsafe { each!(2 _mm_div_ps, a, b) }
     }
     #[inline(always)]
     unsafe fn sqrt(a: Self::F) -> Self::F {
-        unsafe { each!(_mm_sqrt_ps, a) }
+        unsafe { each!(2 _mm_sqrt_ps, a) }
     }
     #[inline(always)]
     unsafe fn min(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(_mm_min_ps, a, b) }
+        unsafe { each!(2 _mm_min_ps, a, b) }
     }
     #[inline(always)]
     unsafe fn max(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(_mm_max_ps, a, b) }
+        unsafe { each!(2 _mm_max_ps, a, b) }
     }
     #[inline(always)]
     unsafe fn lt(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(_mm_cmplt_ps, a, b) }
+        unsafe { each!(2 _mm_cmplt_ps, a, b) }
     }
     #[inline(always)]
     unsafe fn eq(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(_mm_cmpeq_ps, a, b) }
+        unsafe { each!(2 _mm_cmpeq_ps, a, b) }
     }
     #[inline(always)]
     unsafe fn and(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(_mm_and_ps, a, b) }
+        unsafe { each!(2 _mm_and_ps, a, b) }
     }
     #[inline(always)]
     unsafe fn or(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(_mm_or_ps, a, b) }
+        unsafe { each!(2 _mm_or_ps, a, b) }
     }
     #[inline(always)]
     unsafe fn xor(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(_mm_xor_ps, a, b) }
+        unsafe { each!(2 _mm_xor_ps, a, b) }
     }
     #[inline(always)]
     unsafe fn and_not(mask: Self::F, a: Self::F) -> Self::F {
-        unsafe { each!(_mm_andnot_ps, mask, a) }
+        unsafe { each!(2 _mm_andnot_ps, mask, a) }
     }
     #[inline(always)]
     unsafe fn bits(mask: Self::F) -> u32 {
@@ -167,18 +149,18 @@ impl Simd for Sse2 {
     }
     #[inline(always)]
     unsafe fn add_i(a: Self::I, b: Self::I) -> Self::I {
-        unsafe { each!(_mm_add_epi32, a, b) }
+        unsafe { each!(2 _mm_add_epi32, a, b) }
     }
     #[inline(always)]
     unsafe fn sub_i(a: Self::I, b: Self::I) -> Self::I {
-        unsafe { each!(_mm_sub_epi32, a, b) }
+        unsafe { each!(2 _mm_sub_epi32, a, b) }
     }
     #[inline(always)]
     unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
         unsafe {
             let mask = Self::mask(lanes);
             let mask = [_mm_castps_si128(mask[0]), _mm_castps_si128(mask[1])];
-            each!(_mm_or_si128, each!(_mm_and_si128, mask, yes), each!(_mm_andnot_si128, mask, no))
+            each!(2 _mm_or_si128, each!(2 _mm_and_si128, mask, yes), each!(2 _mm_andnot_si128, mask, no))
         }
     }
     #[inline(always)]
@@ -217,27 +199,27 @@ impl Simd for Sse2 {
     }
     #[inline(always)]
     unsafe fn add_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(_mm_add_pd, a, b) }
+        unsafe { each!(4 _mm_add_pd, a, b) }
     }
     #[inline(always)]
     unsafe fn sub_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(_mm_sub_pd, a, b) }
+        unsafe { each!(4 _mm_sub_pd, a, b) }
     }
     #[inline(always)]
     unsafe fn mul_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(_mm_mul_pd, a, b) }
+        unsafe { each!(4 _mm_mul_pd, a, b) }
     }
     #[inline(always)]
     unsafe fn div_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(_mm_div_pd, a, b) }
+        unsafe { each!(4 _mm_div_pd, a, b) }
     }
     #[inline(always)]
     unsafe fn sqrt_d(a: Self::D) -> Self::D {
-        unsafe { each!(_mm_sqrt_pd, a) }
+        unsafe { each!(4 _mm_sqrt_pd, a) }
     }
     #[inline(always)]
     unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(_mm_max_pd, a, b) }
+        unsafe { each!(4 _mm_max_pd, a, b) }
     }
     #[inline(always)]
     unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32 {
@@ -257,7 +239,7 @@ impl Simd for Sse2 {
                 _mm_castps_pd(_mm_unpacklo_ps(mask[1], mask[1])),
                 _mm_castps_pd(_mm_unpackhi_ps(mask[1], mask[1])),
             ];
-            each!(_mm_or_pd, each!(_mm_and_pd, mask, yes), each!(_mm_andnot_pd, mask, no))
+            each!(4 _mm_or_pd, each!(4 _mm_and_pd, mask, yes), each!(4 _mm_andnot_pd, mask, no))
         }
     }
     #[inline(always)]
@@ -574,27 +556,27 @@ impl Simd for Avx2 {
     }
     #[inline(always)]
     unsafe fn add_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(_mm256_add_pd, a, b) }
+        unsafe { each!(2 _mm256_add_pd, a, b) }
     }
     #[inline(always)]
     unsafe fn sub_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(_mm256_sub_pd, a, b) }
+        unsafe { each!(2 _mm256_sub_pd, a, b) }
     }
     #[inline(always)]
     unsafe fn mul_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(_mm256_mul_pd, a, b) }
+        unsafe { each!(2 _mm256_mul_pd, a, b) }
     }
     #[inline(always)]
     unsafe fn div_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(_mm256_div_pd, a, b) }
+        unsafe { each!(2 _mm256_div_pd, a, b) }
     }
     #[inline(always)]
     unsafe fn sqrt_d(a: Self::D) -> Self::D {
-        unsafe { each!(_mm256_sqrt_pd, a) }
+        unsafe { each!(2 _mm256_sqrt_pd, a) }
     }
     #[inline(always)]
     unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(_mm256_max_pd, a, b) }
+        unsafe { each!(2 _mm256_max_pd, a, b) }
     }
     #[inline(always)]
     unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32 {
@@ -611,8 +593,8 @@ impl Simd for Avx2 {
             let low = _mm256_cvtepi32_epi64(_mm256_castsi256_si128(mask));
             let high = _mm256_cvtepi32_epi64(_mm256_extracti128_si256::<1>(mask));
             let mask = [_mm256_castsi256_pd(low), _mm256_castsi256_pd(high)];
-            let no = each!(_mm256_andnot_pd, mask, no);
-            each!(_mm256_or_pd, each!(_mm256_and_pd, mask, yes), no)
+            let no = each!(2 _mm256_andnot_pd, mask, no);
+            each!(2 _mm256_or_pd, each!(2 _mm256_and_pd, mask, yes), no)
         }
     }
     #[inline(always)]
