@@ -56,8 +56,12 @@ pub fn towards_camera(normal: [f32; 3], point: [f32; 3]) -> [f32; 3] {
     if dot > 0.0 { normal.map(|c| -c) } else { normal }
 }
 
-/// The scores of normals at some pixels in the bands of [`iine_scenes::Band::ALL`]. Whatever is finite and not zero
-/// counts as a normal.
+/// Whether there is a normal: whatever is finite and not zero.
+pub fn is_normal(normal: [f32; 3]) -> bool {
+    normal.iter().all(|c| c.is_finite()) && normal != [0.0; 3]
+}
+
+/// The scores of normals at some pixels in the bands of [`iine_scenes::Band::ALL`].
 pub fn by_band(
     frame: &Frame,
     distances: &Distances,
@@ -69,7 +73,7 @@ pub fn by_band(
         let normal = normals[at];
         let score = &mut scores[distances.band(at) as usize];
         score.points += 1;
-        if normal.iter().all(|c| c.is_finite()) && normal != [0.0; 3] {
+        if is_normal(normal) {
             score.angles.push(angle(normal, frame.normals[at]));
         }
     }

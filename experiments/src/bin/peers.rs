@@ -2,13 +2,15 @@
 //!
 //! usage: peers scenes                 the names of the scenes
 //!        peers clouds SCENE FOLDER    writes the scene with every noise, for the peers
-//!        peers scores SCENE FOLDER    prints the scores of our modes, and of the normals that the peers wrote
+//!        peers scores SCENE FOLDER [PEER]
+//!                                     prints the scores of our modes, and of the normals that the peers wrote; over the
+//!                                     pixels that PEER has a normal for
 //!        peers report SCORES.csv      prints the tables of docs/accuracy.md
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use iine_experiments::errors::{Score, by_band, towards_camera};
+use iine_experiments::errors::{Score, by_band, is_normal, towards_camera};
 use iine_experiments::modes::Mode;
 use iine_experiments::ranking::OURS;
 use iine_experiments::table::Row;
@@ -27,12 +29,12 @@ fn main() -> ExitCode {
             Ok(())
         }
         ["clouds", scene, folder] => clouds(scene, Path::new(folder)),
-        ["scores", scene, folder] => scores(scene, Path::new(folder)),
+        ["scores", scene, folder] => scores(scene, Path::new(folder), None),
+        ["scores", scene, folder, peer] => scores(scene, Path::new(folder), Some(peer)),
         ["report", path] => table::read(path).map(|rows| print!("{}", ranking::report(&rows))),
-        _ => Err(
-            "usage: peers scenes | clouds SCENE FOLDER | scores SCENE FOLDER | report SCORES.csv"
-                .into(),
-        ),
+        _ => Err("usage: peers scenes | clouds SCENE FOLDER | scores SCENE FOLDER [PEER] | \
+                  report SCORES.csv"
+            .into()),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -72,12 +74,12 @@ fn clouds(name: &str, folder: &Path) -> Result<(), String> {
     Ok(())
 }
 
-fn scores(name: &str, folder: &Path) -> Result<(), String> {
+fn scores(name: &str, folder: &Path, peer: Option<&str>) -> Result<(), String> {
     let (exact, frames) = frames(name)?;
     let distances = Distances::of(&exact);
     let mut sums: Vec<(&str, String, [Score; 3])> = Vec::new();
     for noisy in &frames {
-        for (who, scores) in scores_of(noisy, &distances, folder)? {
+        for (who, scores) in scores_of(noisy, &distances, folder, peer)? {
             match sums.iter_mut().find(|(noise, w, _)| *noise == noisy.noise && *w == who) {
                 Some((.., sum)) => sum.iter_mut().zip(&scores).for_each(|(a, b)| a.add(b)),
                 None => sums.push((noisy.noise, who, scores)),
@@ -90,22 +92,35 @@ fn scores(name: &str, folder: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// The scores of our modes, and of the normals that the peers wrote, on one frame.
+/// The scores of our modes, and of the normals that the peers wrote, on one frame; over the pixels that a peer has a normal
+/// for, if one is named.
 fn scores_of(
     noisy: &Noisy,
     distances: &Distances,
     folder: &Path,
+    peer: Option<&str>,
 ) -> Result<Vec<(String, [Score; 3])>, String> {
     let frame = &noisy.frame;
-    let score = |normals: &[[f32; 3]]| by_band(frame, distances, normals, 0..normals.len());
+    let read = |path: &Path| {
+        exchange::read_normals(path, frame.points.len())
+            .map_err(|e| format!("{}: {e}", path.display()))
+    };
+    let peers = peers_of(folder, &noisy.file)?;
+    let mut pixels: Vec<usize> = (0..frame.points.len()).collect();
+    if let Some(peer) = peer {
+        let found = peers.iter().find(|(who, _)| who == peer);
+        let (_, path) = found.ok_or(format!("no normals of {peer} in {}", folder.display()))?;
+        let normals = read(path)?;
+        pixels.retain(|at| is_normal(normals[*at]));
+    }
+    let score = |normals: &[[f32; 3]]| by_band(frame, distances, normals, pixels.iter().copied());
     let ours = parallel::map(Mode::all(), |mode| {
         let normals = mode.normals(&frame.points, frame.width()).map_err(|e| e.to_string())?;
         Ok((format!("{OURS}{}", mode.name), score(&normals)))
     });
     let mut found = ours.into_iter().collect::<Result<Vec<_>, String>>()?;
-    for (who, path) in peers_of(folder, &noisy.file)? {
-        let mut normals = exchange::read_normals(&path, frame.points.len())
-            .map_err(|e| format!("{}: {e}", path.display()))?;
+    for (who, path) in peers {
+        let mut normals = read(&path)?;
         for (normal, point) in normals.iter_mut().zip(&frame.points) {
             *normal = towards_camera(*normal, *point);
         }
