@@ -281,7 +281,7 @@ impl<'a> Points<'a> {
     }
 
     /// Whether the 16 bytes from a point's x are part of the same cloud, and of nothing that `normals` writes, for
-    /// every point but a row's last: then points can be read whole.
+    /// every point but a row's last, or where rows follow each other the cloud's: then points can be read whole.
     pub(crate) fn has_whole_points(&self, normals: &Normals) -> bool {
         let interleaved = self.y == self.x.wrapping_add(1) && self.z == self.x.wrapping_add(2);
         let apart = |(field, grid): &(*const f32, Grid)| {
@@ -299,8 +299,9 @@ impl<'a> Points<'a> {
         assert!(y < self.grid.height && columns.end <= self.grid.width);
         let offset = self.grid.offset(columns.start, y);
         let step = self.grid.point_stride;
-        // Behind all points but the very last one is another.
-        let end = if y + 1 < self.grid.height { self.grid.width } else { self.grid.width - 1 };
+        // Behind all these points is another.
+        let goes_on = y + 1 < self.grid.height && self.grid.row_stride == self.grid.width * step;
+        let end = if goes_on { self.grid.width } else { self.grid.width - 1 };
         let inside = columns.end.min(end).saturating_sub(columns.start);
         let whole = if whole_points { inside } else { 0 };
         let below = if y + 2 < self.grid.height { 2 * self.grid.row_stride } else { 0 };

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Why a request was refused. Nothing has been written when one of these is returned.
+/// Why a request was refused. Nothing has been written when one of these is returned (but see [`Error::OutOfMemory`]).
 ///
 /// The discriminants are the status numbers of the C API; they are never reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -13,11 +13,12 @@ pub enum Error {
     NullPointer = 1,
     /// A struct's `struct_size` field is not one that this or an earlier version defines.
     StructSize = 2,
-    /// A width or height is zero, or the buffer they describe does not fit the address space or the slice given.
+    /// A width or height is zero, their product above `i32::MAX`, or the buffer they describe does not fit the address space
+    /// or the slice given; or the sizes of points, normals or maps differ.
     Size = 3,
     /// A stride is not a multiple of 4 bytes, or too small for what it steps over.
     Stride = 4,
-    /// A pointer to `float` is not aligned to 4 bytes.
+    /// A pointer is not aligned to its type.
     Misaligned = 5,
     /// Output bytes overlap input bytes or other output bytes.
     Overlap = 6,
@@ -61,7 +62,7 @@ impl Error {
             Error::StructSize => c"struct_size is not a known size of the struct",
             Error::Size => c"width or height is zero, or the buffer does not fit",
             Error::Stride => c"a stride is not a multiple of 4 bytes or is too small",
-            Error::Misaligned => c"a pointer to float is not aligned to 4 bytes",
+            Error::Misaligned => c"a pointer is not aligned to its type",
             Error::Overlap => c"output bytes overlap input bytes or other output bytes",
             Error::OptionValue => c"an option's value is outside its range",
             Error::Unsupported => {

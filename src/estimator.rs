@@ -91,8 +91,10 @@ impl Estimator {
 
     /// Computes the normal of every pixel of `points` into `normals`, which must be of the same size.
     ///
-    /// Normals have unit length and point to the viewpoint's side; pixels without one get NaN, also as curvature.
-    /// Errors: [`Error::Size`] if the sizes differ, [`Error::Overlap`], and what [`Options::check`] refuses.
+    /// Normals have unit length and point to the viewpoint's side; pixels without one get NaN, also as curvature (which is 0
+    /// where all points of a PCL window of [`Method::CovarianceMatrix`] are one place).
+    /// Errors: [`Error::Size`] if the sizes differ, [`Error::Overlap`], [`Error::OutOfMemory`], [`Error::Threads`], and what
+    /// [`Options::check`] refuses.
     pub fn compute(&mut self, points: &Points, normals: &mut Normals) -> Result<(), Error> {
         self.options.check()?;
         if (points.width(), points.height()) != (normals.width(), normals.height()) {
@@ -160,7 +162,7 @@ impl Estimator {
     /// back with [`BorderPolicy::Mirror`](crate::BorderPolicy::Mirror), which
     /// [`Semantics::Paper`](crate::Semantics::Paper) does not have. NaN if it gives no normal. Takes time
     /// proportional to the window, or with `zero_is_missing` in PCL's semantics to the cloud.
-    /// Errors: as [`Estimator::compute`], and [`Error::Index`] if the pixel is outside the cloud.
+    /// Errors: as [`Estimator::compute`] but for threads, and [`Error::Index`] if the pixel is outside the cloud.
     pub fn compute_window(
         &mut self,
         points: &Points,
@@ -198,7 +200,7 @@ impl Estimator {
     /// Computes the maps behind the normals.
     ///
     /// Errors: [`Error::Size`] if a map's length is wrong, [`Error::Unsupported`] for a map that the semantics or the
-    /// method does not have, and what [`Options::check`] refuses.
+    /// method does not have, [`Error::OutOfMemory`], and what [`Options::check`] refuses.
     pub fn compute_maps(&mut self, points: &Points, maps: &mut Maps) -> Result<(), Error> {
         self.options.check()?;
         let (width, height) = (points.width(), points.height());

@@ -36,7 +36,7 @@ impl Method {
 #[non_exhaustive]
 #[repr(i32)]
 pub enum BorderPolicy {
-    /// The outer `normal_smoothing_size` rows and columns (rounded down) get no normal.
+    /// The outer `normal_smoothing_size` rows and columns (rounded down) get no normal, but with one-sided windows.
     #[default]
     Ignore = 0,
     /// Windows are folded back at the border.
@@ -59,7 +59,7 @@ pub enum Semantics {
     /// The paper as published: windows by [`PaperOptions`], clipped at the border of the image, and sums over the
     /// finite points in them. [`Method::AverageDepthChange`] is the paper's SDC, [`Method::CovarianceMatrix`] its
     /// CM; [`Method::Simple3DGradient`] is not in the paper and not supported. The border policy, the smoothing
-    /// size and the depth change factor have no effect.
+    /// size, fixed or depth-dependent, and the depth change factor have no effect.
     Paper = 1,
 }
 

@@ -574,6 +574,7 @@ static void test_indices(void) {
   bad[COUNT - 1] = INT32_MIN;
   STATUS(IINE_ERROR_INDEX, iine_estimator_compute_indices(e, &points, bad, COUNT, &to_some));
   STATUS(IINE_OK, iine_estimator_compute_indices(e, &points, indices, 0, &to_some));
+  STATUS(IINE_OK, iine_estimator_compute_indices(e, &points, NULL, 0, &to_some));
   CHECK(memcmp(some, some_before, sizeof some) == 0);
 
   to_some.row_stride = to_some.curvature_row_stride = 1; /* not used */

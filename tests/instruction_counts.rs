@@ -8,7 +8,7 @@
 //!
 //! A cloud far from the camera's origin, as in a map's frame, may take a quarter more; one with a far plane for "no
 //! return", as simulators write, with PCL's semantics three times as many; and the paper's CM with a second pass for both
-//! one-sided and crease windows five times.
+//! one-sided and crease windows three and a quarter times as many.
 //!
 //! The program runs itself under valgrind: `frames N SEMANTICS METHOD POLICY METRES PLANE SECOND` computes N frames of a
 //! cloud that is moved to the right by so many metres, with a far plane at that depth if it is not 0, and with a second

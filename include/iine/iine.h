@@ -1,8 +1,8 @@
 /**
  * iine: normals of organized point clouds by integral images.
  *
- * Functions return a status: IINE_OK (0), or one of IINE_ERROR_*, and then have written nothing;
- * iine_status_string() has the text. Nothing here prints, exits or throws.
+ * Functions return a status: IINE_OK (0), or one of IINE_ERROR_*, and then have written nothing (but see
+ * IINE_ERROR_OUT_OF_MEMORY); iine_status_string() has the text. Nothing here prints, exits or throws.
  */
 
 #ifndef IINE_IINE_H
@@ -31,7 +31,7 @@
 #define IINE_ERROR_STRUCT_SIZE 2
 
 /**
- * A width or height is zero, or the buffer does not fit the address space.
+ * A width or height is zero, their product above INT32_MAX, or the buffer does not fit the address space.
  */
 #define IINE_ERROR_SIZE 3
 
@@ -103,7 +103,8 @@
 #define IINE_METHOD_SIMPLE_3D_GRADIENT 3
 
 /**
- * The outer rows and columns, as many as the smoothing size rounded down, get no normal (the default).
+ * The outer rows and columns, as many as the smoothing size rounded down, get no normal (the default), but with
+ * one-sided windows.
  */
 #define IINE_BORDER_POLICY_IGNORE 0
 
@@ -211,7 +212,8 @@ typedef struct iine_points {
 /**
  * Where normals are written: nx, ny, nz, and curvature if its pointer is not NULL. No other byte is touched.
  *
- * Pixels without a normal get NaN in all of them. The fields must not overlap the points' coordinates, but may
+ * Pixels without a normal get NaN in all of them, but curvature 0 where all points of a PCL window of
+ * IINE_METHOD_COVARIANCE_MATRIX are one place. The fields must not overlap the points' coordinates, but may
  * be other fields of the same array. `struct_size` first, unused fields zero: `iine_normals n = { sizeof n };`.
  */
 typedef struct iine_normals {
@@ -237,7 +239,7 @@ typedef struct iine_normals {
   size_t point_stride;
   /**
    * Bytes from a row to the next; a multiple of 4, at least width * point_stride; 0 means just that.
-   * Not used by `iine_estimator_compute_indices`.
+   * Not used, as the curvature's, by `iine_estimator_compute_indices` and `iine_estimator_compute_window`.
    */
   size_t row_stride;
   /**
@@ -347,7 +349,7 @@ int32_t iine_estimator_compute(struct iine_estimator *estimator,
 /**
  * Computes the normals of the pixels that `indices` lists (row * width + column, any order, repeats allowed):
  * element k of `normals`, `normals->point_stride` bytes after element k - 1, belongs to indices[k] and equals
- * what `iine_estimator_compute` gives for that pixel. A `count` of 0 does nothing.
+ * what `iine_estimator_compute` gives for that pixel. A `count` of 0 does nothing, and `indices` may be NULL then.
  *
  * Errors: as `iine_estimator_compute`, and IINE_ERROR_INDEX if an index is outside the cloud. Nothing is
  * written then.
@@ -555,7 +557,8 @@ int32_t iine_estimator_set_paper_gamma(struct iine_estimator *estimator,
 
 /**
  * Sets the limits of the window's radius, in pixels: where it is below `smallest` there is no window; what the
- * depth asks for (Eq. 5) is at least `least_depth` and at most `largest`.
+ * depth asks for (Eq. 5) is at least `least_depth` and at most `largest`. With IINE_SEMANTICS_PAPER; `largest` is
+ * also that of one-sided and crease windows.
  *
  * 1 <= smallest <= least_depth <= largest <= 1000; default 2, 5, 20.
  *

@@ -101,7 +101,7 @@ pub unsafe extern "C" fn iine_estimator_compute(
 
 /// Computes the normals of the pixels that `indices` lists (row * width + column, any order, repeats allowed):
 /// element k of `normals`, `normals->point_stride` bytes after element k - 1, belongs to indices[k] and equals
-/// what `iine_estimator_compute` gives for that pixel. A `count` of 0 does nothing.
+/// what `iine_estimator_compute` gives for that pixel. A `count` of 0 does nothing, and `indices` may be NULL then.
 ///
 /// Errors: as `iine_estimator_compute`, and IINE_ERROR_INDEX if an index is outside the cloud. Nothing is
 /// written then.
@@ -121,11 +121,11 @@ pub unsafe extern "C" fn iine_estimator_compute_indices(
         let estimator = &mut unsafe { reference_mut(estimator) }?.estimator;
         // SAFETY: promised by the caller.
         let points = unsafe { read_points(points) }?;
-        // SAFETY: promised by the caller.
-        unsafe { reference(indices) }?;
         if count == 0 {
             return Ok(());
         }
+        // SAFETY: promised by the caller.
+        unsafe { reference(indices) }?;
         if count > isize::MAX as usize / size_of::<i32>() {
             return Err(Error::Size);
         }

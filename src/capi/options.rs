@@ -279,7 +279,8 @@ pub unsafe extern "C" fn iine_estimator_set_paper_gamma(
 }
 
 /// Sets the limits of the window's radius, in pixels: where it is below `smallest` there is no window; what the
-/// depth asks for (Eq. 5) is at least `least_depth` and at most `largest`.
+/// depth asks for (Eq. 5) is at least `least_depth` and at most `largest`. With IINE_SEMANTICS_PAPER; `largest` is
+/// also that of one-sided and crease windows.
 ///
 /// 1 <= smallest <= least_depth <= largest <= 1000; default 2, 5, 20.
 ///

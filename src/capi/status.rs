@@ -26,7 +26,7 @@ pub const IINE_OK: i32 = 0;
 pub const IINE_ERROR_NULL_POINTER: i32 = 1;
 /// A struct's `struct_size` is not one that this library's version or an earlier one defines.
 pub const IINE_ERROR_STRUCT_SIZE: i32 = 2;
-/// A width or height is zero, or the buffer does not fit the address space.
+/// A width or height is zero, their product above INT32_MAX, or the buffer does not fit the address space.
 pub const IINE_ERROR_SIZE: i32 = 3;
 /// A stride is not a multiple of 4 bytes, or too small for what it steps over.
 pub const IINE_ERROR_STRIDE: i32 = 4;

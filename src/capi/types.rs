@@ -30,7 +30,8 @@ pub const IINE_METHOD_AVERAGE_DEPTH_CHANGE: i32 = 2;
 /// IINE_SEMANTICS_PAPER.
 pub const IINE_METHOD_SIMPLE_3D_GRADIENT: i32 = 3;
 
-/// The outer rows and columns, as many as the smoothing size rounded down, get no normal (the default).
+/// The outer rows and columns, as many as the smoothing size rounded down, get no normal (the default), but with
+/// one-sided windows.
 pub const IINE_BORDER_POLICY_IGNORE: i32 = 0;
 /// Windows are folded back at the border of the image.
 pub const IINE_BORDER_POLICY_MIRROR: i32 = 1;
@@ -81,7 +82,8 @@ pub struct iine_points {
 
 /// Where normals are written: nx, ny, nz, and curvature if its pointer is not NULL. No other byte is touched.
 ///
-/// Pixels without a normal get NaN in all of them. The fields must not overlap the points' coordinates, but may
+/// Pixels without a normal get NaN in all of them, but curvature 0 where all points of a PCL window of
+/// IINE_METHOD_COVARIANCE_MATRIX are one place. The fields must not overlap the points' coordinates, but may
 /// be other fields of the same array. `struct_size` first, unused fields zero: `iine_normals n = { sizeof n };`.
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -98,7 +100,7 @@ pub struct iine_normals {
     /// Bytes from a pixel's normal to the next; a multiple of 4, at least 4.
     pub point_stride: usize,
     /// Bytes from a row to the next; a multiple of 4, at least width * point_stride; 0 means just that.
-    /// Not used by `iine_estimator_compute_indices`.
+    /// Not used, as the curvature's, by `iine_estimator_compute_indices` and `iine_estimator_compute_window`.
     pub row_stride: usize,
     /// The first pixel's curvature (smallest eigenvalue over the trace, 0 to 1/3), or NULL for none.
     /// NaN for the methods that give none.

@@ -1,7 +1,7 @@
 //! Step 4: a normal from the points in a pixel's window. One file per method; this is their list.
 //!
-//! Each file gives the method twice: plainly, walking over the window, which is the specification; and in sums
-//! that integral images give in constant time, which is held to it.
+//! Each file gives the method plainly, walking over the window: the specification, to which the sums that integral images
+//! give in constant time (`crate::fast`) are held.
 
 pub(crate) mod average_3d_gradient;
 pub(crate) mod average_depth_change;

@@ -42,7 +42,7 @@ pub(crate) const GROUP: usize = 8;
 ///
 /// # Safety
 /// The methods may only be called where the processor has the implementor's instruction set: within a function
-/// that [`crate::isa`] dispatched to. Loads and stores are of all lanes, at any address aligned to one element.
+/// that `fast::paths` dispatched to. Loads and stores are of all lanes, at any address aligned to one element.
 pub(crate) trait Simd: Copy {
     const LANES: usize;
     /// So many f32.

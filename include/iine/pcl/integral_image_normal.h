@@ -63,7 +63,7 @@ namespace iine
       /** \brief What happens where a window would cross the border of the image. */
       enum BorderPolicy
       {
-        BORDER_POLICY_IGNORE, ///< the outer int(normal smoothing size) rows and columns get no normal
+        BORDER_POLICY_IGNORE, ///< the outer int(normal smoothing size) rows and columns get no normal, but with one-sided windows
         BORDER_POLICY_MIRROR  ///< windows are folded back at the border
       };
 
@@ -164,7 +164,7 @@ namespace iine
         * \param[in] pos_y the pixel's row
         * \param[in] point_index the pixel's index, pos_y * width + pos_x (not used)
         * \param[out] normal the normal and the curvature, NaN if there is none
-        * \throws pcl::PCLException for SIMPLE_3D_GRADIENT
+        * \throws pcl::PCLException for SIMPLE_3D_GRADIENT with SEMANTICS_PCL
         */
       void
       computePointNormalMirror (const int pos_x, const int pos_y, const unsigned point_index, PointOutT &normal)
@@ -374,7 +374,7 @@ namespace iine
       }
 
       /** \brief Set alpha: the smallest depth change that the sensor can tell at depth d is alpha d^2 (Eq. 4). Used by
-        * SEMANTICS_PAPER and by \ref setCreaseWindows. Not in PCL's class.
+        * SEMANTICS_PAPER, and by \ref setOneSidedWindows and \ref setCreaseWindows. Not in PCL's class.
         * \param[in] alpha in 1/unit of length, finite and above 0, default 0.0028; anything else is refused with a
         * printed error. \ref alphaOfSensor gives it
         */
@@ -407,7 +407,8 @@ namespace iine
           options_.paper_gamma = gamma;
       }
 
-      /** \brief Set the limits of the window's radius with SEMANTICS_PAPER, in pixels. Not in PCL's class.
+      /** \brief Set the limits of the window's radius with SEMANTICS_PAPER, in pixels; the largest is also that of
+        * \ref setOneSidedWindows and \ref setCreaseWindows. Not in PCL's class.
         *
         * 1 <= smallest <= least_depth <= largest <= 1000; anything else is refused with a printed error.
         * \param[in] smallest where the radius is below this there is no window; default 2
@@ -862,7 +863,7 @@ namespace iine
       int rect_width_ = 0;
       int rect_height_ = 0;
 
-      /** \brief Whether that point is the cloud's sensor origin. */
+      /** \brief Whether the viewpoint is the cloud's sensor origin. */
       bool use_sensor_origin_ = true;
 
       /** \brief The outcome of the last computation. */
