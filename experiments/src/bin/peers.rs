@@ -2,9 +2,9 @@
 //!
 //! usage: peers scenes                 the names of the scenes
 //!        peers clouds SCENE FOLDER    writes the scene with every noise, for the peers
-//!        peers scores SCENE FOLDER [PEER]
-//!                                     prints the scores of our modes, and of the normals that the peers wrote; over the
-//!                                     pixels that PEER has a normal for
+//!        peers scores SCENE FOLDER    prints the scores of our modes, and of the normals that the peers wrote
+//!        peers scores SCENE FOLDER PEER
+//!                                     the same, over the pixels that PEER has a normal for
 //!        peers report SCORES.csv      prints the tables of docs/accuracy.md
 
 use std::path::{Path, PathBuf};
