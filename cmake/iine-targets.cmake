@@ -34,8 +34,8 @@ endif()
 add_library(iine::iine ALIAS iine::${iine_kind})
 unset(iine_kind)
 
-# PCL is looked up where a target is used, so it may be found before or after iine; without it, CMake names the
-# missing target.
+# PCL is looked up where a target is used, so it may be found before or after iine (but before add_subdirectory, which
+# sees what was found until then); without it, CMake names the missing target.
 set(iine_pcl_found $<TARGET_EXISTS:pcl_features>)
 add_library(iine::pcl INTERFACE IMPORTED ${iine_SCOPE})
 set_target_properties(iine::pcl PROPERTIES

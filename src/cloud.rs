@@ -497,6 +497,14 @@ impl<'a> Normals<'a> {
         Ok(())
     }
 
+    /// Refuses output that shares a byte with so many indices.
+    pub(crate) fn check_apart_from(&self, indices: *const i32, count: usize) -> Result<(), Error> {
+        let list = Grid::new(count, 1, size_of::<i32>(), 0)?;
+        let collides =
+            |(field, grid): &(*const f32, Grid)| grid.collides(field.addr(), &list, indices.addr());
+        if self.fields().iter().flatten().any(collides) { Err(Error::Overlap) } else { Ok(()) }
+    }
+
     /// Whether what was written to a pixel is a normal.
     ///
     /// # Safety

@@ -106,7 +106,7 @@ impl Estimator {
 
     /// Computes the normals of the pixels that `indices` lists (row * width + column, any order, repeats
     /// allowed): element k of `normals`, which must be `indices.len()` x 1, belongs to `indices[k]` and equals what
-    /// [`Estimator::compute`] gives for that pixel.
+    /// [`Estimator::compute`] gives for that pixel. An empty list does nothing.
     ///
     /// Errors: as [`Estimator::compute`], and [`Error::Index`].
     pub fn compute_indices(
@@ -116,6 +116,9 @@ impl Estimator {
         normals: &mut Normals,
     ) -> Result<(), Error> {
         self.options.check()?;
+        if indices.is_empty() {
+            return Ok(());
+        }
         if (normals.width(), normals.height()) != (indices.len(), 1) {
             return Err(Error::Size);
         }

@@ -549,7 +549,7 @@ static void test_indices(void) {
   static float whole[4 * PIXELS];
   static const int32_t indices[COUNT] = {12 * WIDTH + 12, 0, PIXELS - 1, 12 * WIDTH + 12, 11 * WIDTH + 30};
   float some[4 * (COUNT + 1)], some_before[4 * (COUNT + 1)];
-  int32_t bad[COUNT];
+  int32_t bad[COUNT], list[5 * COUNT], list_before[5 * COUNT];
   iine_estimator *const e = new_estimator();
   const iine_points points = cloud_points();
   const iine_normals to_whole = packed_normals(whole);
@@ -588,6 +588,13 @@ static void test_indices(void) {
   to_some = cloud_normals();
   to_some.nx = &cloud[3].x;
   STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_indices(e, &points, indices, COUNT, &to_some));
+
+  memset(list, 0, sizeof list);
+  memcpy(list_before, list, sizeof list);
+  to_some = packed_normals((float *)(void *)list);
+  STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_indices(e, &points, list + 4 * COUNT - 1, COUNT, &to_some));
+  CHECK(memcmp(list, list_before, sizeof list) == 0);
+  STATUS(IINE_OK, iine_estimator_compute_indices(e, &points, list + 4 * COUNT, COUNT, &to_some));
   iine_estimator_free(e);
 }
 

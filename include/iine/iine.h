@@ -2,7 +2,8 @@
  * iine: normals of organized point clouds by integral images.
  *
  * Functions return a status: IINE_OK (0), or one of IINE_ERROR_*, and then have written nothing (but see
- * IINE_ERROR_OUT_OF_MEMORY); iine_status_string() has the text. Nothing here prints, exits or throws.
+ * IINE_ERROR_OUT_OF_MEMORY); iine_status_string() has the text. Nothing here prints, exits or throws; with
+ * IINE_ERROR_INTERNAL alone, a defect of this library, stderr says what went wrong.
  */
 
 #ifndef IINE_IINE_H
@@ -171,7 +172,7 @@ typedef struct iine_estimator iine_estimator;
  *
  * The three pointers are the addresses of the first pixel's coordinates; the same strides lead from each to the
  * next pixel and to the next row. Interleaved points have y = x + 1, z = x + 2; separate planes have three
- * pointers of their own and a `point_stride` of 4. Set unused fields to zero: `iine_points p = { sizeof p };`.
+ * pointers of their own and a `point_stride` of 4. Clear the struct, set `struct_size`, then the fields you use.
  * A missing point has a non-finite coordinate.
  */
 typedef struct iine_points {
@@ -214,7 +215,7 @@ typedef struct iine_points {
  *
  * Pixels without a normal get NaN in all of them, but curvature 0 where all points of a PCL window of
  * IINE_METHOD_COVARIANCE_MATRIX are one place. The fields must not overlap the points' coordinates, but may
- * be other fields of the same array. `struct_size` first, unused fields zero: `iine_normals n = { sizeof n };`.
+ * be other fields of the same array. Clear the struct, set `struct_size`, then the fields you use.
  */
 typedef struct iine_normals {
   /**
@@ -355,7 +356,7 @@ int32_t iine_estimator_compute(struct iine_estimator *estimator,
  * written then.
  *
  * # Safety
- * As `iine_estimator_compute`; `indices` is NULL or valid for `count` reads.
+ * As `iine_estimator_compute`; `indices` is NULL or valid for `count` reads, and no other thread writes to it.
  */
 int32_t iine_estimator_compute_indices(struct iine_estimator *estimator,
                                        const struct iine_points *points,
@@ -417,7 +418,7 @@ int32_t iine_estimator_compute_maps(struct iine_estimator *estimator,
 int32_t iine_estimator_scratch_size(const struct iine_estimator *estimator, size_t *bytes);
 
 /**
- * Frees the estimator's scratch memory and worker threads; the next computation makes them anew.
+ * Frees the estimator's scratch memory and has its worker threads end; the next computation makes them anew.
  *
  * Errors: IINE_ERROR_NULL_POINTER.
  *

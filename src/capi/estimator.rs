@@ -107,7 +107,7 @@ pub unsafe extern "C" fn iine_estimator_compute(
 /// written then.
 ///
 /// # Safety
-/// As `iine_estimator_compute`; `indices` is NULL or valid for `count` reads.
+/// As `iine_estimator_compute`; `indices` is NULL or valid for `count` reads, and no other thread writes to it.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn iine_estimator_compute_indices(
     estimator: *mut iine_estimator,
@@ -129,10 +129,11 @@ pub unsafe extern "C" fn iine_estimator_compute_indices(
         if count > isize::MAX as usize / size_of::<i32>() {
             return Err(Error::Size);
         }
-        // SAFETY: promised by the caller; neither NULL nor misaligned, and the size fits.
-        let indices = unsafe { std::slice::from_raw_parts(indices, count) };
         // SAFETY: promised by the caller.
         let mut normals = unsafe { read_normals(normals, count, 1, true) }?;
+        normals.check_apart_from(indices, count)?;
+        // SAFETY: promised by the caller; neither NULL nor misaligned, and the size fits.
+        let indices = unsafe { std::slice::from_raw_parts(indices, count) };
         estimator.compute_indices(&points, indices, &mut normals)
     })
 }
@@ -271,7 +272,7 @@ pub unsafe extern "C" fn iine_estimator_scratch_size(
     })
 }
 
-/// Frees the estimator's scratch memory and worker threads; the next computation makes them anew.
+/// Frees the estimator's scratch memory and has its worker threads end; the next computation makes them anew.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER.
 ///

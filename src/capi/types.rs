@@ -56,7 +56,7 @@ pub const IINE_DEPTH_RANGE: i32 = 1;
 ///
 /// The three pointers are the addresses of the first pixel's coordinates; the same strides lead from each to the
 /// next pixel and to the next row. Interleaved points have y = x + 1, z = x + 2; separate planes have three
-/// pointers of their own and a `point_stride` of 4. Set unused fields to zero: `iine_points p = { sizeof p };`.
+/// pointers of their own and a `point_stride` of 4. Clear the struct, set `struct_size`, then the fields you use.
 /// A missing point has a non-finite coordinate.
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -84,7 +84,7 @@ pub struct iine_points {
 ///
 /// Pixels without a normal get NaN in all of them, but curvature 0 where all points of a PCL window of
 /// IINE_METHOD_COVARIANCE_MATRIX are one place. The fields must not overlap the points' coordinates, but may
-/// be other fields of the same array. `struct_size` first, unused fields zero: `iine_normals n = { sizeof n };`.
+/// be other fields of the same array. Clear the struct, set `struct_size`, then the fields you use.
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[allow(non_camel_case_types)]

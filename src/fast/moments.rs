@@ -63,7 +63,7 @@ pub(crate) struct WindowMoments<S: Simd> {
 pub(crate) fn sum_of_moments(points: impl Iterator<Item = [f64; 3]>) -> ([f64; CHANNELS], f64) {
     let (mut sums, mut count) = ([0.0; CHANNELS], 0.0);
     let mut origin = None;
-    for point in points {
+    points.for_each(|point| {
         let origin = origin.get_or_insert(point);
         let [x, y, z] = [0, 1, 2].map(|c| point[c] - origin[c]);
         let of_point = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
@@ -71,7 +71,7 @@ pub(crate) fn sum_of_moments(points: impl Iterator<Item = [f64; 3]>) -> ([f64; C
             *sum += value;
         }
         count += 1.0;
-    }
+    });
     (sums, count)
 }
 

@@ -193,7 +193,8 @@ namespace iine
         if (!std::isfinite (normal_smoothing_size) || normal_smoothing_size <= 0)
         {
           PCL_ERROR ("[iine::%s::setNormalSmoothingSize] %f is not a finite number above 0; the size stays %f.\n",
-                     feature_name_.c_str (), normal_smoothing_size, options_.normal_smoothing_size);
+                     feature_name_.c_str (), static_cast<double> (normal_smoothing_size),
+                     static_cast<double> (options_.normal_smoothing_size));
           return;
         }
         options_.normal_smoothing_size = normal_smoothing_size;
@@ -813,7 +814,12 @@ namespace iine
                   Value *iine_maps::*field)
       {
         map.clear ();
-        int status = has_maps_ ? checkInput () : IINE_ERROR_NULL_POINTER;
+        if (!has_maps_)
+        {
+          PCL_ERROR ("[iine::%s::%s] Nothing has been computed yet.\n", feature_name_.c_str (), member);
+          return (false);
+        }
+        int status = checkInput ();
         if (status == IINE_OK)
           status = setOptions (computed_options_);
         if (status == IINE_OK)
