@@ -176,7 +176,8 @@ impl<'a> Points<'a> {
     /// Errors: [`Error::NullPointer`], [`Error::Misaligned`], [`Error::Size`], [`Error::Stride`].
     ///
     /// # Safety
-    /// Every pixel's three floats must be readable, and not written by anyone else, for `'a`.
+    /// Every pixel's three floats must be readable, and not written by anyone else, for `'a`; and where y and z follow x,
+    /// so must be, for all points but the last of a row, or of all where rows follow each other, the four bytes behind z.
     pub unsafe fn from_raw(
         [x, y, z]: [*const f32; 3],
         width: usize,

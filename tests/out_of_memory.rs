@@ -80,6 +80,7 @@ fn all_options() -> Vec<Options> {
 #[test]
 fn memory_that_is_not_there_is_an_error() {
     missed_in_the_middle();
+    missed_for_another_width();
     for (isa, width, height) in [(Isa::active(), 320, 240), (Isa::Scalar, 76, 54)] {
         let cloud = Cloud::new(Kind::NanBlocks, width, height, 20);
         for options in all_options() {
@@ -120,6 +121,31 @@ fn missed_in_the_middle() {
         );
         assert!(none > 0, "{method:?}: never in the middle");
         assert_same_bits(&found, &expected, cloud.width, "two depths");
+    }
+}
+
+/// What was held for a frame before is for that frame still, or for none.
+fn missed_for_another_width() {
+    let narrow = Cloud::new(Kind::NanBlocks, 64, 24, 22);
+    let wide = Cloud::new(Kind::NanBlocks, 400, 24, 23);
+    for options in all_options() {
+        let expected = compute(&mut Estimator::new(options.clone()), &narrow);
+        let mut found = vec![[7.0; 4]; wide.points.len()];
+        let what = format!("another width: {options:?}");
+        until_there_is_enough(
+            || {
+                let blocks = LEFT.swap(usize::MAX, Ordering::Relaxed);
+                let mut estimator = Estimator::new(options.clone());
+                compute(&mut estimator, &narrow);
+                LEFT.store(blocks, Ordering::Relaxed);
+                let result = compute_to(&mut found, &mut estimator, &wide);
+                LEFT.store(usize::MAX, Ordering::Relaxed);
+                let again = compute(&mut estimator, &narrow);
+                assert_same_bits(&again, &expected, narrow.width, &what);
+                result
+            },
+            &what,
+        );
     }
 }
 

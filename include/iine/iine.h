@@ -173,7 +173,8 @@ typedef struct iine_estimator iine_estimator;
  * The three pointers are the addresses of the first pixel's coordinates; the same strides lead from each to the
  * next pixel and to the next row. Interleaved points have y = x + 1, z = x + 2; separate planes have three
  * pointers of their own and a `point_stride` of 4. Clear the struct, set `struct_size`, then the fields you use.
- * A missing point has a non-finite coordinate.
+ * A missing point has a non-finite coordinate. The four bytes behind z of interleaved points may be read too, but not
+ * behind the last point of a row, or of all where rows follow each other.
  */
 typedef struct iine_points {
   /**

@@ -303,8 +303,8 @@ fn find_wanted(
 }
 
 /// Where the normals of the first pass are looked at: around the middle pixels of the blocks that have one, windows of the
-/// smallest radius that the middle or a corner of the block has; the least there is where the middle has no window. None
-/// without crease windows.
+/// smallest radius that the middle or a corner of the block has, at most the largest of all; the least there is where the
+/// middle has no window. None without crease windows.
 fn find_samples(
     windows: &mut Windows,
     cloud: &Cloud,
@@ -328,7 +328,7 @@ fn find_samples(
                     let other = sizes[pixels[place]];
                     size = if other > 0.0 && other < size { other } else { size };
                 }
-                *sample = radius_of_size(size, options).max(1);
+                *sample = radius_of_size(size, options).clamp(1, options.paper.largest_radius);
             }
         }
     });

@@ -753,6 +753,8 @@ impl Rows {
 
     /// Has room for rows of an image of this width.
     fn resize(&mut self, width: usize) -> Result<(), Error> {
+        // None, should there not be enough memory.
+        self.width = 0;
         let length = (1 + width).next_multiple_of(LANES) + LANES;
         let Rows { inverse_depths, means, depths, columns, .. } = self;
         for (rows, count) in
