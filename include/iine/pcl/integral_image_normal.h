@@ -48,13 +48,14 @@ namespace iine
   template <typename PointInT, typename PointOutT>
   class IntegralImageNormalEstimation : public pcl::Feature<PointInT, PointOutT>
   {
-    using pcl::Feature<PointInT, PointOutT>::fake_indices_;
-    using pcl::Feature<PointInT, PointOutT>::feature_name_;
-    using pcl::Feature<PointInT, PointOutT>::indices_;
-    using pcl::Feature<PointInT, PointOutT>::input_;
-    using pcl::Feature<PointInT, PointOutT>::k_;
-    using pcl::Feature<PointInT, PointOutT>::search_parameter_;
-    using pcl::Feature<PointInT, PointOutT>::search_radius_;
+    protected:
+      using pcl::Feature<PointInT, PointOutT>::fake_indices_;
+      using pcl::Feature<PointInT, PointOutT>::feature_name_;
+      using pcl::Feature<PointInT, PointOutT>::indices_;
+      using pcl::Feature<PointInT, PointOutT>::input_;
+      using pcl::Feature<PointInT, PointOutT>::k_;
+      using pcl::Feature<PointInT, PointOutT>::search_parameter_;
+      using pcl::Feature<PointInT, PointOutT>::search_radius_;
 
     public:
       using Ptr = pcl::shared_ptr<IntegralImageNormalEstimation<PointInT, PointOutT> >;
@@ -528,7 +529,8 @@ namespace iine
           report ("initCompute", last_status_);
           return (false);
         }
-        search_parameter_ = search_radius_ != 0.0 ? search_radius_ : static_cast<double> (k_);
+        const bool has_radius = std::fpclassify (search_radius_) != FP_ZERO;
+        search_parameter_ = has_radius ? search_radius_ : static_cast<double> (k_);
         return (true);
       }
 
