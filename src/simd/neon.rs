@@ -70,6 +70,7 @@ impl Simd for Neon {
     }
     #[inline(always)]
     unsafe fn min(a: Self::F, b: Self::F) -> Self::F {
+        // Unlike Arm's own, `b` where one is NaN; so the other two.
         unsafe { each!(2 vbslq_f32, each!(2 vcltq_f32, a, b), a, b) }
     }
     #[inline(always)]
