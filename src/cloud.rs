@@ -488,21 +488,21 @@ impl<'a> Normals<'a> {
 
     /// Refuses output that shares a byte with `points`' coordinates.
     pub(crate) fn check_disjoint(&self, points: &Points) -> Result<(), Error> {
-        for (field, grid) in self.fields().iter().flatten() {
-            for input in points.fields() {
-                if grid.collides(field.addr(), &points.grid, input) {
-                    return Err(Error::Overlap);
-                }
-            }
-        }
-        Ok(())
+        points.fields().into_iter().try_for_each(|field| self.check_apart(&points.grid, field))
     }
 
     /// Refuses output that shares a byte with so many indices.
-    pub(crate) fn check_apart_from(&self, indices: *const i32, count: usize) -> Result<(), Error> {
-        let list = Grid::new(count, 1, size_of::<i32>(), 0)?;
-        let collides =
-            |(field, grid): &(*const f32, Grid)| grid.collides(field.addr(), &list, indices.addr());
+    pub(crate) fn check_disjoint_from_indices(
+        &self,
+        indices: *const i32,
+        count: usize,
+    ) -> Result<(), Error> {
+        self.check_apart(&Grid::new(count, 1, size_of::<i32>(), 0)?, indices.addr())
+    }
+
+    /// Refuses output that shares a byte with an input of such a grid at an address.
+    fn check_apart(&self, input: &Grid, at: usize) -> Result<(), Error> {
+        let collides = |(field, grid): &(*const f32, Grid)| grid.collides(field.addr(), input, at);
         if self.fields().iter().flatten().any(collides) { Err(Error::Overlap) } else { Ok(()) }
     }
 

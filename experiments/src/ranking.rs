@@ -161,7 +161,8 @@ fn standings(tables: &[(&str, Vec<Line>)]) -> String {
         alone.iter().take(3).map(|(who, count)| format!("{who} in {count}")).collect();
     format!(
         "In {held} of {columns} columns of errors no peer is ahead of ours: for every peer there is a mode of ours that \
-         covers\nas much, within {COVERED} points in a hundred, with an error no larger, within {LEVEL} degrees. With one and the same mode against all peers: {}.\n\n\
+         covers\nas much, within {COVERED} points in a hundred, with an error no larger, within {LEVEL} degrees. \
+         With one and the same mode against all peers: {}.\n\n\
          | noise | band | measure | ours is | ours: degrees at coverage | the hardest peer |\n\
          |---|---|---|---|---|---|\n{rows}",
         alone.join(", ")

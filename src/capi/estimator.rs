@@ -131,7 +131,7 @@ pub unsafe extern "C" fn iine_estimator_compute_indices(
         }
         // SAFETY: promised by the caller.
         let mut normals = unsafe { read_normals(normals, count, 1, true) }?;
-        normals.check_apart_from(indices, count)?;
+        normals.check_disjoint_from_indices(indices, count)?;
         // SAFETY: promised by the caller; neither NULL nor misaligned, and the size fits.
         let indices = unsafe { std::slice::from_raw_parts(indices, count) };
         estimator.compute_indices(&points, indices, &mut normals)

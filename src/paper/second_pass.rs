@@ -295,7 +295,7 @@ fn find_wanted(
             }
             if most > f32::NEG_INFINITY {
                 let size = wanted_size(most, options);
-                *wanted = radius_of_size(size, options).min(options.paper.largest_radius);
+                *wanted = radius_of_size(size, options);
             }
         }
     });
@@ -303,8 +303,8 @@ fn find_wanted(
 }
 
 /// Where the normals of the first pass are looked at: around the middle pixels of the blocks that have one, windows of the
-/// smallest radius that the middle or a corner of the block has, at most the largest of all; the least there is where the
-/// middle has no window. None without crease windows.
+/// smallest radius that the middle or a corner of the block has; the least there is where the middle has no window. None
+/// without crease windows.
 fn find_samples(
     windows: &mut Windows,
     cloud: &Cloud,
@@ -328,7 +328,7 @@ fn find_samples(
                     let other = sizes[pixels[place]];
                     size = if other > 0.0 && other < size { other } else { size };
                 }
-                *sample = radius_of_size(size, options).clamp(1, options.paper.largest_radius);
+                *sample = radius_of_size(size, options).max(1);
             }
         }
     });
@@ -344,12 +344,13 @@ fn wanted_size(depth: f32, options: &Options) -> f32 {
     }
 }
 
-/// The radius of a window of a size as [`Windows`] has them.
+/// The radius of a window of a size as [`Windows`] has them, at most the largest of all.
 fn radius_of_size(size: f32, options: &Options) -> u32 {
-    match options.semantics {
+    let radius = match options.semantics {
         Semantics::Paper => size as u32,
         Semantics::Pcl => size as u32 / 2,
-    }
+    };
+    radius.min(options.paper.largest_radius)
 }
 
 /// What the windows of the pixels next to one, as many as are in a block, cover of the image, if they have its size, as

@@ -64,7 +64,7 @@ namespace iine
       /** \brief What happens where a window would cross the border of the image. */
       enum BorderPolicy
       {
-        BORDER_POLICY_IGNORE, ///< the outer int(normal smoothing size) rows and columns get no normal, but with one-sided windows
+        BORDER_POLICY_IGNORE, ///< without one-sided windows the outer int(smoothing size) rows and columns get no normal
         BORDER_POLICY_MIRROR  ///< windows are folded back at the border
       };
 
