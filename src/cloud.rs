@@ -537,7 +537,7 @@ impl<'a> Normals<'a> {
 
 /// Asks for the cache lines of so many bytes.
 #[inline(always)]
-fn prefetch(at: *const f32, bytes: usize) {
+pub(crate) fn prefetch(at: *const f32, bytes: usize) {
     #[cfg(target_arch = "x86_64")]
     for line in (0..bytes).step_by(LINE) {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};

@@ -6,6 +6,7 @@ use std::iter::repeat_n;
 
 use super::windows::least_depth_change;
 use crate::Error;
+use crate::cloud::prefetch;
 use crate::fast::arithmetic::{Floats, dot};
 use crate::fast::lanes::{LANES, Lanes};
 use crate::fast::windows::threshold;
@@ -48,6 +49,7 @@ pub(super) unsafe fn rows<S: Groups>(
         unsafe { image_rows.read::<S::Widest>(even, row)? };
         for blocks in concerned.chunks(S::Widest::LANES) {
             let group = Group { even, row, blocks };
+            group.prefetch();
             // SAFETY: as the caller's.
             unsafe {
                 group.candidates(&mut found);
@@ -474,6 +476,18 @@ impl<S: Along> Found<'_, S> {
 }
 
 impl Group<'_> {
+    /// Asks for the cache lines of the blocks' points, long before they are read.
+    #[inline(always)]
+    fn prefetch(&self) {
+        let &Group { even, row, blocks } = self;
+        let &Cloud { width, height, .. } = even.cloud;
+        for y in row * BLOCK..(row * BLOCK + BLOCK).min(height) {
+            for block in blocks {
+                prefetch(even.cloud.points[y * width + block * BLOCK].as_ptr(), 1);
+            }
+        }
+    }
+
     /// Finds the windows that the blocks' pixels may take.
     ///
     /// # Safety
