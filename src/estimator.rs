@@ -1,13 +1,11 @@
 //! The estimator: options and scratch memory, and the steps in their order.
 
-use std::iter::repeat_n;
-
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::depth_change::depth_change_map;
 use crate::distance::distance_map;
 use crate::eigenvalues::eigenvalue_map;
-use crate::fast::paper::{Along, Job};
+use crate::fast::paper::{Along, Job, Own};
 use crate::fast::{self, SIZES, Scratch};
 use crate::isa::Isa;
 use crate::memory::{refill, resize};
@@ -15,8 +13,7 @@ use crate::methods::{Estimate, estimate, estimate_window, start};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
 use crate::paper::{
-    self, Asked, Blocks, Cloud, EvenWindows, NO_WINDOW, PaperMaps, SecondPass, Windows,
-    with_missing_as_nan,
+    self, Asked, Blocks, Cloud, EvenWindows, PaperMaps, SecondPass, Windows, with_missing_as_nan,
 };
 use crate::smoothing_area::window_side;
 use crate::threads::Workers;
@@ -288,18 +285,23 @@ impl Estimator {
         if is_plain {
             cloud.read(points, options)?;
         } else {
-            fast::paper::read_cloud(&job, cloud, scratch.workers())?;
+            fast::paper::read_cloud(&job, cloud, scratch)?;
         }
         // To PCL's windows, a point that misses a coordinate is missing whole.
         let is_pcl = options.semantics == Semantics::Pcl;
-        let cleaned = is_pcl.then(|| packed(&cloud.points, cloud.width, cloud.height));
+        let cleaned =
+            (!is_plain || is_pcl).then(|| packed(&cloud.points, cloud.width, cloud.height));
         let points = cleaned.as_ref().unwrap_or(points);
+        let whole_points = points.has_whole_points(normals);
         // But for zeros, which are left out now, this is as PCL.
         if !is_plain && !options.has_second_pass() {
             return fast::compute(isa, points, options, indices, normals, scratch);
         }
-        let job = Job { points, ..job };
-        let mut engine = Engine { job, scratch, is_plain };
+        let job = Job { points, whole_points, ..job };
+        // CM's sums are those of even windows too.
+        let is_along = !is_plain && !is_pcl && options.method == Method::CovarianceMatrix;
+        let own = is_along.then_some((indices, normals));
+        let mut engine = Engine { job, scratch, own, is_plain };
         second_pass.compute(cloud, options, &mut engine)?;
         let width = cloud.width;
         let chosen = |at: usize| second_pass.chosen(cloud, options, at);
@@ -310,15 +312,16 @@ impl Estimator {
         } else {
             if is_pcl {
                 fast::compute(isa, points, options, indices, normals, scratch)?;
-            } else {
+            } else if !is_along {
                 let choices = second_pass.choices();
                 fast::paper::compute_own(&job, choices, indices, normals, scratch)?;
             }
             let workers = scratch.workers();
             if indices.is_some() {
-                write(normals, indices, width, workers, |_, at| chosen(at));
+                let left = |at| is_along.then(|| second_pass.left(points, options, at)).flatten();
+                write(normals, indices, width, workers, |_, at| chosen(at).or_else(|| left(at)));
             } else {
-                fast::paper::write_chosen(&job, second_pass, cloud, normals, workers);
+                fast::paper::write_chosen(&job, second_pass, cloud, normals, is_along, workers);
             }
         }
         if options.one_sided_windows {
@@ -388,6 +391,8 @@ fn normals_of(
 struct Engine<'a> {
     job: Job<'a>,
     scratch: &'a mut Scratch,
+    /// Where the estimates of the pixels that are not concerned are written along with even windows, as [`write`] has it.
+    own: Option<(Option<&'a [i32]>, &'a Normals<'a>)>,
     is_plain: bool,
 }
 
@@ -399,20 +404,11 @@ impl Engine<'_> {
         radius: impl Fn(usize) -> u32,
         estimates: &mut Vec<[f32; 4]>,
     ) -> Result<(), Error> {
-        let of_block = |block: usize| self.of_radius(blocks.middle(block), radius(block)).into();
-        refill(estimates, (0..blocks.count()).map(of_block))
-    }
-
-    /// The plain form's estimate of the paper's method from the window of a radius; none if that is 0.
-    fn of_radius(&self, pixel: (usize, usize), radius: u32) -> Estimate {
-        if radius == 0 {
-            return Estimate::NONE;
-        }
         let Job { points, options, .. } = self.job;
-        let found = paper::of_radius(points, options, pixel, radius as usize);
-        let point = points.at(pixel.0, pixel.1);
-        let normal = turn_to_viewpoint(found.normal, point, options.viewpoint);
-        Estimate { normal, ..found }
+        let of_block = |block: usize| {
+            paper::of_radius(points, options, blocks.middle(block), radius(block)).into()
+        };
+        refill(estimates, (0..blocks.count()).map(of_block))
     }
 
     /// The plain form of the pixels' own estimates, from windows of these sizes.
@@ -423,7 +419,7 @@ impl Engine<'_> {
         let of_pcl = is_pcl.then(|| Plain::new(points, options)).transpose()?;
         Ok(move |at: usize| {
             let (x, y) = (at % width, at / width);
-            let of_paper = || self.of_radius((x, y), sizes[at] as u32);
+            let of_paper = || paper::of_radius(points, options, (x, y), sizes[at] as u32);
             of_pcl.as_ref().map_or_else(of_paper, |plain| plain.estimate(x, y))
         })
     }
@@ -435,7 +431,7 @@ impl paper::Engine for Engine<'_> {
     }
 
     fn sizes(&mut self, sizes: &mut Vec<f32>) -> Result<(), Error> {
-        let Engine { job, ref mut scratch, is_plain } = *self;
+        let Engine { job, ref mut scratch, is_plain, .. } = *self;
         let Job { isa, points, options, .. } = job;
         let (width, height) = (points.width(), points.height());
         match (options.semantics, is_plain) {
@@ -457,38 +453,36 @@ impl paper::Engine for Engine<'_> {
         &mut self,
         cloud: &Cloud,
         asked: &Asked,
+        concerned: &[bool],
         found: &mut Windows,
     ) -> Result<(), Error> {
         let method = Method::CovarianceMatrix;
         let has_normals = self.job.options.method == method;
-        let Windows { even, of_even, samples, of_samples, .. } = found;
+        let Windows { even, of_even, .. } = found;
         if self.is_plain {
             refill(even, paper::even_windows(cloud, asked))?;
             if has_normals {
                 let blocks = &asked.blocks;
                 self.plain_of_blocks(blocks, |block| even[block].radius as u32, of_even)?;
-                self.plain_of_blocks(blocks, |block| samples[block], of_samples)?;
             }
             return Ok(());
         }
         let size = (asked.blocks.across, asked.blocks.down);
         let of_even = normals_of(of_even, size)?;
-        let of_samples = normals_of(of_samples, size)?;
-        let along =
-            has_normals.then_some(Along { of_even: &of_even, samples, of_samples: &of_samples });
+        let own = self.own.map(|(indices, normals)| Own { concerned, indices, normals });
+        let along = has_normals.then_some(Along { of_even: &of_even, own });
         // CM's sums are what even windows are made from.
         let options = &Options { method, ..self.job.options.clone() };
         let job = Job { options, ..self.job };
         fast::paper::even_windows(&job, (cloud, asked), even, along, self.scratch)
     }
 
-    fn choices(&mut self, even: &EvenWindows, choices: &mut Vec<u32>) -> Result<(), Error> {
-        refill(choices, repeat_n(NO_WINDOW, even.cloud.depths.len()))?;
+    fn choices(&mut self, even: &EvenWindows, choices: &mut [u32]) {
         if self.is_plain {
             even.choose(choices);
-            return Ok(());
+        } else {
+            fast::paper::choices(self.job.isa, even, choices, self.scratch);
         }
-        fast::paper::choices(self.job.isa, even, choices, self.scratch)
     }
 
     fn of_blocks(

@@ -37,28 +37,32 @@ impl Workers {
     pub fn share<T: Send>(
         &self,
         parts: impl Iterator<Item = T> + Send,
+        work: impl Fn(usize, &mut dyn Iterator<Item = T>) + Sync,
+    ) {
+        let parts = Mutex::new(parts);
+        let next = || parts.lock().unwrap_or_else(PoisonError::into_inner).next();
+        self.for_each(self.count(), |worker, _| work(worker, &mut std::iter::from_fn(next)));
+    }
+
+    /// As [`Workers::share`], of work that can fail: tells whether some did.
+    pub fn try_share<T: Send>(
+        &self,
+        parts: impl Iterator<Item = T> + Send,
         work: impl Fn(usize, &mut dyn Iterator<Item = T>) -> Result<(), Error> + Sync,
     ) -> Result<(), Error> {
-        let parts = Mutex::new((parts, Ok(())));
-        let lock = || parts.lock().unwrap_or_else(PoisonError::into_inner);
-        self.for_each(self.count(), |worker, _| {
-            let done = work(worker, &mut std::iter::from_fn(|| lock().0.next()));
+        let failed = Mutex::new(Ok(()));
+        self.share(parts, |worker, parts| {
+            let done = work(worker, parts);
             if done.is_err() {
-                lock().1 = done;
+                *failed.lock().unwrap_or_else(PoisonError::into_inner) = done;
             }
         });
-        parts.into_inner().unwrap_or_else(PoisonError::into_inner).1
+        failed.into_inner().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Calls `work` with every part.
     pub fn each<T: Send>(&self, parts: impl Iterator<Item = T> + Send, work: impl Fn(T) + Sync) {
-        let parts = Mutex::new(parts);
-        let next = || parts.lock().unwrap_or_else(PoisonError::into_inner).next();
-        self.for_each(self.count(), |_, _| {
-            while let Some(part) = next() {
-                work(part);
-            }
-        });
+        self.share(parts, |_, parts| parts.for_each(&work));
     }
 
     /// Calls `work(worker, item)` for every item; no two calls run at once with the same worker.

@@ -251,7 +251,7 @@ fn compute_slices(
     let sink = sink.transpose()?;
     let reach = AtomicUsize::new(0);
     let chunks = chunks(strips, job.per_slice, workers.count());
-    let done = workers.share(chunks, |worker, chunks| {
+    let done = workers.try_share(chunks, |worker, chunks| {
         let WorkerScratch { windows, sums, .. } = &mut *lock(&each[worker]);
         for chunk in chunks {
             for first in chunk.clone().step_by(job.per_slice) {

@@ -34,11 +34,16 @@ impl Blocks {
 
     /// Column and row of a block's middle pixel.
     pub fn middle(&self, block: usize) -> (usize, usize) {
-        let [x, y] = [block % self.across, block / self.across].map(|at| at * BLOCK);
-        (middle(x, BLOCK, self.width), middle(y, BLOCK, self.height))
+        self.middle_of((block % self.across, block / self.across))
     }
 
-    /// The numbers of a block's pixels; the last ones inside the image stand for those that are cut off.
+    /// That of the block in a column and row of blocks.
+    pub fn middle_of(&self, (column, row): (usize, usize)) -> (usize, usize) {
+        (middle(column * BLOCK, BLOCK, self.width), middle(row * BLOCK, BLOCK, self.height))
+    }
+
+    /// The numbers of the pixels of the block in a column and row of blocks; the last ones inside the image stand for those
+    /// that are cut off.
     #[inline(always)]
     pub fn pixels(&self, (column, row): (usize, usize)) -> [usize; BLOCK * BLOCK] {
         let x = |at: usize| (column * BLOCK + at % BLOCK).min(self.width - 1);

@@ -1,6 +1,6 @@
 //! The organized cloud with its depths; every way of being missing has become NaN.
 
-use super::blocks::BLOCK;
+use super::blocks::{BLOCK, Blocks};
 use super::planes::inverse_depth;
 use super::rect::Rect;
 use crate::Error;
@@ -19,6 +19,8 @@ pub(crate) struct Cloud {
     /// With some behind the last one, so that there are whole blocks of them.
     pub points: Vec<[f32; 3]>,
     pub depths: Vec<f32>,
+    /// Block by block the sums of its points' coordinates, and their number.
+    pub sums: Vec<[f32; 4]>,
 }
 
 impl Cloud {
@@ -41,7 +43,26 @@ impl Cloud {
                 *of_to = depth(*to);
             }
         }
+        let across = Blocks::of(self.width, self.height).across;
+        for at in 0..self.sums.len() {
+            self.sums[at] = self.sum_of_block((at % across, at / across));
+        }
         Ok(())
+    }
+
+    /// As [`Cloud::sums`] has it: first down the columns, then along the row.
+    fn sum_of_block(&self, (column, row): (usize, usize)) -> [f32; 4] {
+        let mut columns = [[0.0; 4]; BLOCK];
+        for y in (row * BLOCK..self.height).take(BLOCK) {
+            for (x, sums) in (column * BLOCK..self.width).zip(&mut columns) {
+                let at = self.index(x, y);
+                if !self.is_missing(at) {
+                    let [x, y, z] = self.points[at];
+                    *sums = plus(*sums, [x, y, z, 1.0]);
+                }
+            }
+        }
+        columns.into_iter().reduce(plus).expect("columns")
     }
 
     /// Takes the size of a cloud.
@@ -50,12 +71,14 @@ impl Cloud {
         let is_paper = options.semantics == Semantics::Paper;
         self.has_range = is_paper && options.paper.depth == Depth::Range;
         resize(&mut self.points, self.width * self.height + BLOCK - 1, [f32::NAN; 3])?;
-        resize(&mut self.depths, self.width * self.height, f32::NAN)
+        resize(&mut self.depths, self.width * self.height, f32::NAN)?;
+        let blocks = Blocks::of(self.width, self.height).count();
+        resize(&mut self.sums, blocks, [0.0; 4])
     }
 
     /// Bytes held.
     pub fn size(&self) -> usize {
-        bytes(&self.points) + bytes(&self.depths)
+        bytes(&self.points) + bytes(&self.depths) + bytes(&self.sums)
     }
 
     pub fn index(&self, x: usize, y: usize) -> usize {
@@ -78,6 +101,10 @@ impl Cloud {
         let [before, step] = [[at % self.width, 1], [at / self.width, self.width]][axis];
         (1..=before).find(|gap| !self.is_missing(at - gap * step))
     }
+}
+
+fn plus(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
+    std::array::from_fn(|i| a[i] + b[i])
 }
 
 /// Points by column and row; a missing one is NaN.

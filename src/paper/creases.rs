@@ -1,50 +1,123 @@
-//! Where the first pass' normals vary strongly: near edges without a depth change.
+//! Where the surface's normals vary strongly: near edges without a depth change.
 
-use super::blocks::{BLOCK, Blocks};
+use super::blocks::{BLOCK, Blocks, MIDDLE};
+use super::cloud::Cloud;
 use super::rect::Rect;
 use super::summed_area::SummedArea;
 use crate::Error;
 use crate::threads::Workers;
 
-/// Integral images of normals, one for each block.
+/// Integral images of the blocks' points, and of the normals of one window around each block, which are made from them.
 #[derive(Debug, Default)]
 pub(crate) struct SummedNormals {
-    sums: SummedArea<4>,
+    /// x, y, z, and how many there are.
+    points: SummedArea<4>,
+    normals: SummedArea<4>,
 }
 
+/// The sum of some points, and their number.
+type Sum = [f64; 4];
+
 impl SummedNormals {
-    /// Sums others; NaN where there is none.
+    /// Becomes those of a cloud, with windows of these radii; 0 for none.
     pub fn sum(
         &mut self,
-        estimates: &[[f32; 4]],
+        cloud: &Cloud,
         blocks: &Blocks,
+        radius: impl Fn((usize, usize)) -> u32 + Sync,
         workers: &Workers,
     ) -> Result<(), Error> {
-        self.sums.sum_up(blocks.across, blocks.down, workers, |(column, row)| {
-            let [x, y, z, _] = estimates[row * blocks.across + column];
-            if x.is_nan() { [0.0; 4] } else { [x, y, z, 1.0].map(f64::from) }
+        let (across, down) = (blocks.across, blocks.down);
+        self.points.sum_up(across, down, workers, |(column, row)| {
+            cloud.sums[row * across + column].map(f64::from)
+        })?;
+        let points = &self.points;
+        self.normals.sum_up(across, down, workers, |block| {
+            let halves = match radius(block) {
+                0 => return [0.0; 4],
+                radius if radius <= MIDDLE as u32 => halves_of_block(cloud, blocks, block),
+                radius => halves_around(points, blocks, block, radius),
+            };
+            normal(halves).map_or([0.0; 4], |[x, y, z]| [x, y, z, 1.0])
         })
     }
 
     /// Bytes held.
     pub fn size(&self) -> usize {
-        self.sums.size()
+        self.points.size() + self.normals.size()
     }
 
-    /// How much the normals of the blocks in a rectangle vary: 1 - |mean|^2, for small angles their variance in square
-    /// radians; from 0 to 1, and 1 if there are none.
-    fn variation(&self, blocks: &Rect) -> f64 {
-        let [x, y, z, count] = self.sums.sum(blocks);
-        if count == 0.0 { 1.0 } else { 1.0 - (x * x + y * y + z * z) / (count * count) }
-    }
-
-    /// Whether the normals of the blocks that a rectangle of pixels touches vary strongly.
+    /// Whether the normals of the blocks that a rectangle of pixels touches vary strongly, or there are none. How much they
+    /// vary is 1 - |mean|^2: for small angles their variance in square radians. (Rounding, beside points that are orders of
+    /// magnitude farther, makes them vary too: then all windows are looked at again.)
     pub fn vary_in(&self, pixels: &Rect) -> bool {
         let [x, y] =
             [&pixels.x, &pixels.y].map(|range| range.start / BLOCK..range.end.div_ceil(BLOCK));
-        self.variation(&Rect { x, y }) > STRONG_VARIATION
+        let [x, y, z, count] = self.normals.sum(&Rect { x, y });
+        x * x + y * y + z * z <= (1.0 - STRONG_VARIATION) * (count * count)
     }
 }
 
-/// In square radians: normals about 5.4 degrees from their mean.
-const STRONG_VARIATION: f64 = 0.009;
+/// In square radians: normals about 5.3 degrees from their mean.
+const STRONG_VARIATION: f64 = 0.0085;
+
+/// The halves of a block: left and right, above and below.
+fn halves_of_block(cloud: &Cloud, blocks: &Blocks, block: (usize, usize)) -> [[Sum; 2]; 2] {
+    let mut halves = [[[0.0; 4]; 2]; 2];
+    for (number, at) in blocks.pixels(block).into_iter().enumerate() {
+        if !cloud.is_missing(at) {
+            let [px, py, pz] = cloud.points[at].map(f64::from);
+            let half = [number % BLOCK, number / BLOCK].map(|line| line / MIDDLE);
+            for axis in 0..2 {
+                let to = &mut halves[axis][half[axis]];
+                *to = plus(*to, [px, py, pz, 1.0]);
+            }
+        }
+    }
+    halves
+}
+
+/// The halves of the window of blocks around a block that is as large as that of a radius, without the block's own column or
+/// row. At the edges of the image the block stands for those beyond.
+fn halves_around(
+    points: &SummedArea<4>,
+    blocks: &Blocks,
+    (column, row): (usize, usize),
+    radius: u32,
+) -> [[Sum; 2]; 2] {
+    let reach = ((radius as usize + 1) / BLOCK).max(1);
+    // Where the halves before and behind start and end.
+    let halves = |at: usize, count: usize| {
+        let (first, last) = (at.saturating_sub(reach), (at + reach).min(count - 1));
+        [first, at.max(1), (at + 1).min(last), last + 1]
+    };
+    let [x0, x1, x2, x3] = halves(column, blocks.across);
+    let [top, above, below, bottom] = halves(row, blocks.down).map(|row| points.row(row));
+    let columns = |x: usize| minus(bottom[x], top[x]);
+    let rows = |row: &[Sum]| minus(row[x3], row[x0]);
+    let (first, last, height, width) = (columns(x0), columns(x3), rows(top), rows(bottom));
+    [
+        [minus(columns(x1), first), minus(last, columns(x2))],
+        [minus(rows(above), height), minus(width, rows(below))],
+    ]
+}
+
+/// Across the ways from the mean of the left half to that of the right one, and from above to below: the mean 3-D gradients.
+fn normal(halves: [[Sum; 2]; 2]) -> Option<[f64; 3]> {
+    // As long as the numbers of points make them: means would take divisions.
+    let [u, v] = halves.map(|[[a, b, c, before], [d, e, f, behind]]| {
+        [d * before - a * behind, e * before - b * behind, f * before - c * behind]
+    });
+    let normal = [v[1] * u[2] - v[2] * u[1], v[2] * u[0] - v[0] * u[2], v[0] * u[1] - v[1] * u[0]];
+    let length2 = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
+    let scale = 1.0 / length2.sqrt();
+    scale.is_finite().then(|| normal.map(|n| n * scale))
+}
+
+fn minus(a: Sum, b: Sum) -> Sum {
+    std::array::from_fn(|i| a[i] - b[i])
+}
+
+fn plus(a: Sum, b: Sum) -> Sum {
+    std::array::from_fn(|i| a[i] + b[i])
+}

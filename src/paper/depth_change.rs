@@ -11,8 +11,8 @@
 use std::iter::repeat_n;
 use std::ops::Range;
 
+use super::blocks::Blocks;
 use super::cloud::Cloud;
-use super::distance::least_steps;
 use super::planes::{JITTER, Plane, inverse_depth};
 use super::rect::Rect;
 use crate::Error;
@@ -21,6 +21,9 @@ use crate::threads::Workers;
 
 /// More than any window's radius. (Signed: every processor has the least of eight.)
 const LARGEST_CLEAN: i16 = i16::MAX / 2;
+
+/// What is looked at together of a row of sixteen-bit numbers.
+const TOGETHER: usize = 8;
 
 /// Where there are depth changes, row by row; kept from frame to frame.
 #[derive(Debug, Default)]
@@ -31,13 +34,26 @@ pub(crate) struct DepthChanges {
     below: Vec<bool>,
     /// The pixels that have a change among those next to them.
     spoilt: Vec<bool>,
+    /// Every pixel's steps along its column to the next one of these, with room beside the rows.
+    steps: Vec<i16>,
     clean_radii: Vec<i16>,
+}
+
+/// How far from depth changes pixels are.
+#[derive(Clone, Copy)]
+pub(crate) struct Clean<'a> {
+    /// Pixel by pixel, whether there is a change among those next to it.
+    pub spoilt: &'a [bool],
+    /// Block by block the largest radius around the middle pixel of a window in which no two neighbours are a depth change
+    /// apart; `LARGEST_CLEAN` where it is no less than what was asked for.
+    pub radii: &'a [i16],
 }
 
 impl DepthChanges {
     /// Bytes held.
     pub fn size(&self) -> usize {
-        bytes(&self.right) + bytes(&self.below) + bytes(&self.spoilt) + bytes(&self.clean_radii)
+        let DepthChanges { right, below, spoilt, steps, clean_radii } = self;
+        [right, below, spoilt].map(bytes).iter().sum::<usize>() + bytes(steps) + bytes(clean_radii)
     }
 
     /// Becomes the changes of a cloud: `is_change(depth, difference, gap)` says whether a difference in depth to the
@@ -124,31 +140,78 @@ impl DepthChanges {
         }
     }
 
-    /// The largest radius around every pixel, row by row, of a window in which no two neighbours are a depth change
-    /// apart; at most `LARGEST_CLEAN`, as where there is no change.
-    pub fn clean_radii(&mut self, width: usize, height: usize) -> Result<&[i16], Error> {
-        let DepthChanges { right, below, spoilt, clean_radii } = self;
+    /// How far from the changes the pixels of an image are, where windows have radii up to `limit`.
+    pub fn clean(
+        &mut self,
+        (width, height): (usize, usize),
+        limit: u32,
+        workers: &Workers,
+    ) -> Result<Clean<'_>, Error> {
+        let DepthChanges { right, below, spoilt, steps, clean_radii } = self;
         refill(spoilt, repeat_n(false, width * height))?;
         // Both pixels of a change, and those next to them along it.
-        for y in 0..height {
-            let right = &right[y * width..][..width];
+        workers.each(spoilt.chunks_mut(width).enumerate(), |(y, spoilt)| {
             for y in y.saturating_sub(1)..(y + 2).min(height) {
-                let spoilt = &mut spoilt[y * width..][..width];
+                let right = &right[y * width..][..width];
                 mark(spoilt, right);
                 mark(&mut spoilt[1..], right);
             }
-            let below = &below[y * width..][..width];
-            for y in y..(y + 2).min(height) {
-                let spoilt = &mut spoilt[y * width..][..width];
+            for y in y.saturating_sub(1)..=y {
+                let below = &below[y * width..][..width];
                 mark(spoilt, below);
                 mark(&mut spoilt[1..], below);
                 mark(spoilt, &below[1..]);
             }
+        });
+        // The chessboard distance: along the columns to all pixels, then along the rows to the blocks' middles.
+        let reach = (limit as usize).min(width.max(height)).min(LARGEST_CLEAN as usize);
+        let stride = reach + width + reach + TOGETHER;
+        refill(steps, repeat_n(LARGEST_CLEAN, height * stride))?;
+        for (steps, spoilt) in steps.chunks_mut(stride).zip(spoilt.chunks(width)) {
+            for (to, spoilt) in steps[reach..].iter_mut().zip(spoilt) {
+                *to = if *spoilt { 0 } else { LARGEST_CLEAN };
+            }
         }
-        // The chessboard distance.
-        least_steps(clean_radii, spoilt, (width, height), LARGEST_CLEAN, 1, 1)?;
-        Ok(clean_radii)
+        for y in 1..height {
+            let (above, row) = steps.split_at_mut(y * stride);
+            step_from(&mut row[..stride], &above[(y - 1) * stride..]);
+        }
+        for y in (1..height).rev() {
+            let (above, row) = steps.split_at_mut(y * stride);
+            step_from(&mut above[(y - 1) * stride..], &row[..stride]);
+        }
+        let blocks = Blocks::of(width, height);
+        refill(clean_radii, repeat_n(0, blocks.count()))?;
+        workers.each(clean_radii.chunks_mut(blocks.across).enumerate(), |(row, radii)| {
+            for (column, radius) in radii.iter_mut().enumerate() {
+                let (x, y) = blocks.middle(row * blocks.across + column);
+                let steps = least_steps_along(&steps[y * stride + x..], reach);
+                *radius = if steps < reach as i16 { steps } else { LARGEST_CLEAN };
+            }
+        });
+        Ok(Clean { spoilt, radii: clean_radii })
     }
+}
+
+/// The steps from a row to the next one.
+fn step_from(row: &mut [i16], next: &[i16]) {
+    for (to, from) in row.iter_mut().zip(next) {
+        *to = (*to).min(from + 1);
+    }
+}
+
+/// The chessboard distance of the pixel that is `reach` behind the first, by the steps along the columns of those around it;
+/// at most `reach`.
+fn least_steps_along(steps: &[i16], reach: usize) -> i16 {
+    let mut along = std::array::from_fn::<_, TOGETHER, _>(|i| i as i16 - reach as i16);
+    let mut least = [reach as i16; TOGETHER];
+    for steps in steps.chunks_exact(TOGETHER).take((2 * reach + 1).div_ceil(TOGETHER)) {
+        for i in 0..TOGETHER {
+            least[i] = least[i].min(steps[i].max(along[i].abs()));
+            along[i] += TOGETHER as i16;
+        }
+    }
+    least.into_iter().fold(reach as i16, i16::min)
 }
 
 /// How much the inverse depth changes from pixel to pixel along the rows, axis 0, or the columns, in the plane that fits a

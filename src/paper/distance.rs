@@ -1,7 +1,6 @@
 //! Step 2: the distance transform map (the paper's T): how far the nearest depth change is, in pixels.
 
 use std::iter::repeat_n;
-use std::ops::Add;
 
 use crate::Error;
 use crate::memory::{refill, table};
@@ -84,27 +83,27 @@ fn chamfer(changes: &[bool], width: usize, height: usize) -> Result<Vec<f32>, Er
 }
 
 #[inline(always)]
-fn step<T: Copy + Ord + Add<Output = T>>(to: &mut T, from: T, weight: T) {
+fn step(to: &mut u32, from: u32, weight: u32) {
     *to = (*to).min(from + weight);
 }
 
 /// Puts into a map the least weight of the steps along rows and columns and along diagonals that lead to every pixel from
 /// one of the `starts`, in two passes; `far` where it is more, to which weights can be added.
-pub(crate) fn least_steps<T: Copy + Default + Ord + Add<Output = T>>(
-    map: &mut Vec<T>,
+fn least_steps(
+    map: &mut Vec<u32>,
     starts: &[bool],
     (width, height): (usize, usize),
-    far: T,
-    straight: T,
-    diagonal: T,
+    far: u32,
+    straight: u32,
+    diagonal: u32,
 ) -> Result<(), Error> {
-    refill(map, starts.iter().map(|&start| if start { T::default() } else { far }))?;
+    refill(map, starts.iter().map(|&start| if start { 0 } else { far }))?;
     // The steps along a row, one way or the other.
-    let along_step = |before: T, to: &mut T| {
+    let along_step = |before: u32, to: &mut u32| {
         step(to, before, straight);
         *to
     };
-    let from_next_row = |row: &mut [T], next: &[T]| {
+    let from_next_row = |row: &mut [u32], next: &[u32]| {
         row.iter_mut().zip(next).for_each(|(to, from)| step(to, *from, straight));
         row[1..].iter_mut().zip(next).for_each(|(to, from)| step(to, *from, diagonal));
         row.iter_mut().zip(&next[1..]).for_each(|(to, from)| step(to, *from, diagonal));

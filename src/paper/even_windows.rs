@@ -6,6 +6,7 @@
 
 use super::blocks::Blocks;
 use super::cloud::Cloud;
+use super::depth_change::Clean;
 use super::planes::Plane;
 use super::rect::Rect;
 
@@ -47,8 +48,7 @@ pub(crate) struct Asked<'a> {
     pub blocks: Blocks,
     /// The radius that the depth asks for, block by block, at most `limit`; 0 where all points are missing.
     pub wanted: &'a [u32],
-    /// The largest radius of a window without a depth change, pixel by pixel.
-    pub clean: &'a [i16],
+    pub clean: Clean<'a>,
     /// The largest radius of all.
     pub limit: u32,
     /// The smallest variance that is told from none.
@@ -79,7 +79,7 @@ pub(crate) fn even_windows<'a>(
 /// That of one block: the plain form.
 pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<EvenWindow> {
     let pixel = asked.blocks.middle(block);
-    let clean = asked.clean[cloud.index(pixel.0, pixel.1)] as u32;
+    let clean = asked.clean.radii[block] as u32;
     let wanted = asked.wanted[block];
     let rect = |radius: u32| Rect::around(pixel, radius as usize, (cloud.width, cloud.height));
     let plane = |radius: u32| Plane::of(cloud, &rect(radius));

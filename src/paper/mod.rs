@@ -45,6 +45,7 @@ use crate::eigenvalues::eigenvalue_map;
 use crate::memory::table;
 use crate::methods::Estimate;
 use crate::options::{Options, Semantics};
+use crate::orientation::turn_to_viewpoint;
 use crate::threads::Workers;
 
 /// The maps of [`Semantics::Paper`], row by row.
@@ -156,14 +157,20 @@ fn rect_around(pixel: (usize, usize), size: (usize, usize), image: (usize, usize
     Rect { x: range(pixel.0, size.0, image.0), y: range(pixel.1, size.1, image.1) }
 }
 
-/// The plain form's estimate of a pixel from the window of a radius.
+/// The plain form's estimate of a pixel from the window of a radius, turned to the viewpoint; none if that is 0.
 pub(crate) fn of_radius(
     points: &Points,
     options: &Options,
     pixel: (usize, usize),
-    radius: usize,
+    radius: u32,
 ) -> Estimate {
+    if radius == 0 {
+        return Estimate::NONE;
+    }
     let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
-    let rect = window(pixel, radius, points.width(), points.height());
-    methods::estimate(options.method, &cleaned, &rect)
+    let rect = window(pixel, radius as usize, points.width(), points.height());
+    let found = methods::estimate(options.method, &cleaned, &rect);
+    let point = points.at(pixel.0, pixel.1);
+    let normal = turn_to_viewpoint(found.normal, point, options.viewpoint);
+    Estimate { normal, ..found }
 }

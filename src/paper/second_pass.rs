@@ -1,6 +1,6 @@
 //! The second pass: normals near depth changes and near creases, from even windows.
 
-use std::iter::{once, repeat_n};
+use std::iter::repeat_n;
 
 use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::choices::{EvenWindows, NO_WINDOW};
@@ -10,9 +10,11 @@ use super::depth_change::DepthChanges;
 use super::even_windows::{Asked, EvenWindow};
 use super::rect::Rect;
 use super::{
-    find_depth_changes, is_depth_change, rect_around, smoothing_area, surroundings, window,
+    find_depth_changes, is_depth_change, of_radius, rect_around, smoothing_area, surroundings,
+    window,
 };
 use crate::Error;
+use crate::cloud::Points;
 use crate::memory::{bytes, refill};
 use crate::methods::Estimate;
 use crate::options::{Method, Options, Semantics};
@@ -28,16 +30,18 @@ pub(crate) trait Engine {
     /// The size of every pixel's own window, as [`Windows`] has them.
     fn sizes(&mut self, sizes: &mut Vec<f32>) -> Result<(), Error>;
 
-    /// The even windows of all blocks; with their estimates, and those of the samples, if the method is CM.
+    /// The even windows of all blocks; with their estimates if the method is CM. It may write the estimates of the pixels
+    /// that are not `concerned` along with them.
     fn even_windows(
         &mut self,
         cloud: &Cloud,
         asked: &Asked,
+        concerned: &[bool],
         found: &mut Windows,
     ) -> Result<(), Error>;
 
-    /// The block whose window each pixel takes, or [`NO_WINDOW`].
-    fn choices(&mut self, even: &EvenWindows, choices: &mut Vec<u32>) -> Result<(), Error>;
+    /// The block whose window each pixel takes; the others' choices stay.
+    fn choices(&mut self, even: &EvenWindows, choices: &mut [u32]);
 
     /// The estimates of windows around blocks' middle pixels, for the blocks that have one, by their radii.
     fn of_blocks(
@@ -56,16 +60,13 @@ pub(crate) struct Windows {
     /// Block by block.
     pub even: Vec<EvenWindow>,
     pub of_even: Vec<[f32; 4]>,
-    /// Around the blocks' middle pixels, by the pixels' own: the radii, 0 for none.
-    pub samples: Vec<u32>,
-    pub of_samples: Vec<[f32; 4]>,
 }
 
 impl Windows {
     /// Bytes held.
     fn size(&self) -> usize {
-        let Windows { sizes, even, of_even, samples, of_samples } = self;
-        bytes(sizes) + bytes(even) + bytes(of_even) + bytes(samples) + bytes(of_samples)
+        let Windows { sizes, even, of_even } = self;
+        bytes(sizes) + bytes(even) + bytes(of_even)
     }
 }
 
@@ -118,30 +119,29 @@ impl SecondPass {
         }
         find_depth_changes(depth_changes, cloud, options, engine.workers())?;
         depth_changes.drop_explained(cloud, engine.workers());
-        let clean = depth_changes.clean_radii(cloud.width, cloud.height)?;
+        let size = (cloud.width, cloud.height);
+        let limit = options.paper.largest_radius;
+        let clean = depth_changes.clean(size, limit, engine.workers())?;
         let blocks = Blocks::of(cloud.width, cloud.height);
         find_wanted(wanted, cloud, &blocks, options, engine.workers())?;
-        let limit = options.paper.largest_radius;
         let least_noise = Asked::least_noise(options.paper.alpha);
         let asked = Asked { blocks, wanted, clean, limit, least_noise };
-        find_samples(windows, cloud, &blocks, options, engine.workers())?;
-        engine.even_windows(cloud, &asked, windows)?;
-        let is_cm = options.method == Method::CovarianceMatrix;
         if options.crease_windows {
-            if !is_cm {
-                engine.of_blocks(&blocks, &windows.samples, &mut windows.of_samples)?;
-            }
-            normals.sum(&windows.of_samples, &blocks, engine.workers())?;
+            let radius = |block| sample_radius(&windows.sizes, cloud, &blocks, block, options);
+            normals.sum(cloud, &blocks, radius, engine.workers())?;
         }
         refill(concerned, repeat_n(false, cloud.depths.len()))?;
         refill(levels, repeat_n(0, blocks.count()))?;
         let concern = Concern { cloud, options, blocks: &blocks, sizes: &windows.sizes, normals };
         concern.find(concerned, levels, engine.workers());
+        refill(&mut self.choices, repeat_n(NO_WINDOW, cloud.depths.len()))?;
+        engine.even_windows(cloud, &asked, concerned, windows)?;
+        // From here on CM needs no more memory: something may have been written.
         let of_even = &mut windows.of_even;
         let windows = &windows.even;
         let even = EvenWindows { cloud, asked: &asked, options, concerned, levels, windows };
-        engine.choices(&even, &mut self.choices)?;
-        if !is_cm {
+        engine.choices(&even, &mut self.choices);
+        if options.method != Method::CovarianceMatrix {
             let taken = &mut self.taken;
             refill(taken, repeat_n(0, blocks.count()))?;
             // Marked first, as many pixels take the same.
@@ -174,6 +174,11 @@ impl SecondPass {
         &self.choices
     }
 
+    /// The pixels that could take an even window.
+    pub fn concerned(&self) -> &[bool] {
+        &self.concerned
+    }
+
     /// The estimates of the even windows that pixels take, turned to the viewpoint from the blocks' middle pixels.
     pub fn of_even(&self) -> &[[f32; 4]] {
         &self.windows.of_even
@@ -185,6 +190,13 @@ impl SecondPass {
         let found: Estimate = self.windows.of_even[choice as usize].into();
         let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
         Some(Estimate { normal, ..found })
+    }
+
+    /// The estimate, in the paper's semantics, of a pixel that could take an even window but takes none.
+    pub fn left(&self, points: &Points, options: &Options, at: usize) -> Option<Estimate> {
+        let is_left = self.concerned[at] && self.choices[at] == NO_WINDOW;
+        let pixel = (at % points.width(), at / points.width());
+        is_left.then(|| of_radius(points, options, pixel, self.windows.sizes[at] as u32))
     }
 
     /// The estimate of a pixel that has a point but no normal, as `has_normal` says if no even window gave one: that of the
@@ -232,7 +244,7 @@ impl Concern<'_> {
                 self.find_one_sided(concerned, first);
             }
             for (column, level) in levels.iter_mut().enumerate() {
-                *level = self.level(blocks.pixels((column, row)), first, concerned);
+                *level = self.level((column, row), first, concerned);
             }
         });
     }
@@ -250,27 +262,37 @@ impl Concern<'_> {
     }
 
     /// The level of a block; marks its pixels near creases. `concerned` starts with pixel number `first`.
-    fn level(&self, pixels: [usize; BLOCK * BLOCK], first: usize, concerned: &mut [bool]) -> u8 {
-        let &Concern { cloud, options, sizes, .. } = self;
-        let has_window = |at: &usize| sizes[*at] > 0.0;
-        let is_concerned = |at: &usize| concerned[at - first];
-        let is_one_sided = options.one_sided_windows && pixels.iter().any(is_concerned);
+    fn level(&self, block: (usize, usize), first: usize, concerned: &mut [bool]) -> u8 {
+        let &Concern { options, blocks, sizes, .. } = self;
+        let pixels = blocks.pixels(block);
+        let is_one_sided =
+            options.one_sided_windows && pixels.iter().any(|at| concerned[at - first]);
         let level = if is_one_sided { EVERY_LEVEL } else { 0 };
-        let with_window = || {
-            let middle = pixels[MIDDLE * BLOCK + MIDDLE];
-            once(middle).chain(pixels).find(has_window)
-        };
-        let normals_vary =
-            |at: usize| self.normals.vary_in(&windows_of_block(cloud, options, at, sizes[at]));
-        if !(options.crease_windows && with_window().is_some_and(normals_vary)) {
+        if !(options.crease_windows && self.normals_vary(block)) {
             return level;
         }
         for at in pixels {
-            concerned[at - first] |= has_window(&at);
+            concerned[at - first] |= sizes[at] > 0.0;
         }
         CREASE_LEVELS.max(level)
     }
+
+    /// Whether normals vary where the window of a block's middle pixel is, or else of its first one that has a window.
+    fn normals_vary(&self, block: (usize, usize)) -> bool {
+        let &Concern { cloud, options, blocks, sizes, normals } = self;
+        let (mut x, mut y) = blocks.middle_of(block);
+        let mut size = sizes[cloud.index(x, y)];
+        if size == 0.0 {
+            let has_window = |at: &usize| sizes[*at] > 0.0;
+            let Some(at) = blocks.pixels(block).into_iter().find(has_window) else { return false };
+            (x, y, size) = (at % cloud.width, at / cloud.width, sizes[at]);
+        }
+        normals.vary_in(&windows_of_block(cloud, options, (x, y), size))
+    }
 }
+
+/// Blocks whose depths are looked at together.
+const TOGETHER: usize = 8;
 
 /// The radii that the depths ask for, block by block: the largest of a block's pixels.
 fn find_wanted(
@@ -284,55 +306,46 @@ fn find_wanted(
     let is_paper = options.semantics == Semantics::Paper;
     let rows = cloud.depths.chunks(BLOCK * cloud.width);
     workers.each(wanted.chunks_mut(blocks.across).zip(rows), |(wanted, rows)| {
-        for (column, wanted) in wanted.iter_mut().enumerate() {
-            // Where the depth asks for most.
-            let mut most = f32::NEG_INFINITY;
+        for (wanted, first) in wanted.chunks_mut(TOGETHER).zip((0..).step_by(TOGETHER * BLOCK)) {
+            // Where the depth asks for most, in each column.
+            let mut most = [f32::NEG_INFINITY; TOGETHER * BLOCK];
             for row in rows.chunks(cloud.width) {
-                for depth in row[column * BLOCK..].iter().take(BLOCK) {
+                for (most, depth) in most.iter_mut().zip(&row[first..]) {
                     let depth = if is_paper { depth.abs() } else { *depth };
-                    most = if depth > most { depth } else { most };
+                    *most = if depth > *most { depth } else { *most };
                 }
             }
-            if most > f32::NEG_INFINITY {
-                let size = wanted_size(most, options);
-                *wanted = radius_of_size(size, options);
+            for (wanted, columns) in wanted.iter_mut().zip(most.chunks(BLOCK)) {
+                let most = columns.iter().fold(f32::NEG_INFINITY, |most, depth| most.max(*depth));
+                if most > f32::NEG_INFINITY {
+                    *wanted = radius_of_size(wanted_size(most, options), options);
+                }
             }
         }
     });
     Ok(())
 }
 
-/// Where the normals of the first pass are looked at: around the middle pixels of the blocks that have one, windows of the
-/// smallest radius that the middle or a corner of the block has; the least there is where the middle has no window. None
-/// without crease windows.
-fn find_samples(
-    windows: &mut Windows,
+/// The radius of the window with which the normal of a block is looked at: the smallest one that its middle pixel or a
+/// corner has, the least there is where the middle has no window; 0 where it has no point.
+fn sample_radius(
+    sizes: &[f32],
     cloud: &Cloud,
     blocks: &Blocks,
+    block: (usize, usize),
     options: &Options,
-    workers: &Workers,
-) -> Result<(), Error> {
-    let Windows { sizes, samples, .. } = windows;
-    refill(samples, repeat_n(0, blocks.count()))?;
-    if !options.crease_windows {
-        return Ok(());
+) -> u32 {
+    let pixels = blocks.pixels(block);
+    let middle = pixels[MIDDLE * BLOCK + MIDDLE];
+    if cloud.is_missing(middle) {
+        return 0;
     }
-    workers.each(samples.chunks_mut(blocks.across).enumerate(), |(row, samples)| {
-        for (column, sample) in samples.iter_mut().enumerate() {
-            let pixels = blocks.pixels((column, row));
-            let middle = pixels[MIDDLE * BLOCK + MIDDLE];
-            let is_cut = column * BLOCK + MIDDLE >= cloud.width;
-            if !is_cut && !cloud.is_missing(middle) {
-                let mut size = sizes[middle];
-                for place in [0, BLOCK - 1, BLOCK * (BLOCK - 1), BLOCK * BLOCK - 1] {
-                    let other = sizes[pixels[place]];
-                    size = if other > 0.0 && other < size { other } else { size };
-                }
-                *sample = radius_of_size(size, options).max(1);
-            }
-        }
-    });
-    Ok(())
+    let mut size = sizes[middle];
+    for corner in [0, BLOCK - 1, BLOCK * (BLOCK - 1), BLOCK * BLOCK - 1] {
+        let other = sizes[pixels[corner]];
+        size = if other > 0.0 && other < size { other } else { size };
+    }
+    radius_of_size(size, options).max(1)
 }
 
 /// The size that the window of a pixel of this depth has far from any depth change, as [`Windows`] has them but for
@@ -355,9 +368,8 @@ fn radius_of_size(size: f32, options: &Options) -> u32 {
 
 /// What the windows of the pixels next to one, as many as are in a block, cover of the image, if they have its size, as
 /// [`Windows`] has them.
-fn windows_of_block(cloud: &Cloud, options: &Options, at: usize, size: f32) -> Rect {
-    let (width, height) = (cloud.width, cloud.height);
-    let (pixel, size) = ((at % width, at / width), size as usize);
+fn windows_of_block(cloud: &Cloud, options: &Options, pixel: (usize, usize), size: f32) -> Rect {
+    let (width, height, size) = (cloud.width, cloud.height, size as usize);
     match options.semantics {
         Semantics::Paper => window(pixel, size + MIDDLE, width, height),
         Semantics::Pcl => {

@@ -55,6 +55,11 @@ impl<const N: usize> SummedArea<N> {
         bytes(&self.sums)
     }
 
+    /// The sums over the rectangles that end before row `y`, by the column that they end before.
+    pub fn row(&self, y: usize) -> &[[f64; N]] {
+        &self.sums[y * self.stride..][..self.stride]
+    }
+
     /// The sum over a rectangle (Eq. 3, not divided).
     pub fn sum(&self, rect: &Rect) -> [f64; N] {
         let at = |x, y| &self.sums[y * self.stride + x];

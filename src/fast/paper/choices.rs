@@ -18,7 +18,7 @@ use crate::paper::{
 };
 use crate::simd::{Along, Groups, Simd, load_by_fours};
 
-/// Finds the choices of the pixels of some rows of blocks, which are none so far.
+/// Finds the choices of the pixels of some rows of blocks, which are none so far; there is room.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
@@ -27,26 +27,22 @@ pub(super) unsafe fn rows<S: Groups>(
     even: &EvenWindows,
     rows: &mut dyn Iterator<Item = (usize, &mut [u32])>,
     scratch: &mut Scratch,
-) -> Result<(), Error> {
+) {
     let Blocks { across, .. } = even.asked.blocks;
     let Scratch { concerned, rows: image_rows, candidates } = scratch;
-    // A block's own and those around it, for as many radii as the largest can be halved to.
-    let levels = 0..=even.asked.limit.ilog2() as u8;
-    let most = 1 + levels.map(|level| places_at(level).len()).sum::<usize>();
-    resize(candidates, most, Candidates::NONE)?;
     // SAFETY: as the caller's.
     let least_noise = unsafe { Floats::<S::Widest>::splat(even.asked.least_noise) };
     let [noise, there, exact] = [least_noise; 3];
     let mut found = Found { candidates, number: 0, least_noise, noise, there, exact };
     for (row, choices) in rows {
         let levels = &even.levels[row * across..][..across];
-        make_room(concerned, across)?;
+        concerned.clear();
         concerned.extend((0..across).filter(|block| levels[*block] > 0));
         if concerned.is_empty() {
             continue;
         }
         // SAFETY: as the caller's.
-        unsafe { image_rows.read::<S::Widest>(even, row)? };
+        unsafe { image_rows.read::<S::Widest>(even, row) };
         for blocks in concerned.chunks(S::Widest::LANES) {
             let group = Group { even, row, blocks };
             group.prefetch();
@@ -58,7 +54,6 @@ pub(super) unsafe fn rows<S: Groups>(
             }
         }
     }
-    Ok(())
 }
 
 /// What one worker needs, kept from frame to frame.
@@ -71,6 +66,16 @@ pub(super) struct Scratch {
 }
 
 impl Scratch {
+    /// Makes room for images of this width and windows up to the radius `limit`.
+    pub fn reserve(&mut self, width: usize, limit: u32) -> Result<(), Error> {
+        make_room(&mut self.concerned, width.div_ceil(BLOCK))?;
+        // A block's own and those around it, for as many radii as the largest can be halved to.
+        let levels = 0..=limit.ilog2() as u8;
+        let most = 1 + levels.map(|level| places_at(level).len()).sum::<usize>();
+        resize(&mut self.candidates, most, Candidates::NONE)?;
+        self.rows.resize(width)
+    }
+
     /// Bytes held.
     pub fn size(&self) -> usize {
         bytes(&self.concerned) + self.rows.size() + bytes(&self.candidates)
@@ -767,6 +772,9 @@ impl Rows {
 
     /// Has room for rows of an image of this width.
     fn resize(&mut self, width: usize) -> Result<(), Error> {
+        if self.width == width {
+            return Ok(());
+        }
         // None, should there not be enough memory.
         self.width = 0;
         let length = (1 + width).next_multiple_of(LANES) + LANES;
@@ -780,17 +788,14 @@ impl Rows {
         Ok(())
     }
 
-    /// Becomes those around another row of blocks.
+    /// Becomes those around another row of blocks; there is room.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn read<S: Along>(&mut self, even: &EvenWindows, row: usize) -> Result<(), Error> {
+    unsafe fn read<S: Along>(&mut self, even: &EvenWindows, row: usize) {
         let &EvenWindows { cloud, asked, concerned, .. } = even;
         let &Cloud { width, height, .. } = cloud;
-        if self.width != width {
-            self.resize(width)?;
-        }
         let length = self.length;
         for line in 0..AROUND {
             let y = (row * BLOCK + line).wrapping_sub(1);
@@ -815,17 +820,16 @@ impl Rows {
                 *to = if *concerned { *depth } else { f32::NAN };
             }
             // SAFETY: as the caller's.
-            unsafe { self.find_means::<S>(line, &asked.clean[pixels]) };
+            unsafe { self.find_means::<S>(line, &asked.clean.spoilt[pixels]) };
         }
-        Ok(())
     }
 
-    /// Finds the means around the pixels of a line of the blocks, whose clean radii are these.
+    /// Finds the means around the pixels of a line of the blocks, which are spoilt or not.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn find_means<S: Along>(&mut self, line: usize, clean: &[i16]) {
+    unsafe fn find_means<S: Along>(&mut self, line: usize, spoilt: &[bool]) {
         let Rows { length, inverse_depths, columns, means, .. } = self;
         let rows = [line, line + 1, line + 2].map(|row| &inverse_depths[row * *length..]);
         // SAFETY: as the caller's; rows have room for whole groups.
@@ -837,23 +841,23 @@ impl Rows {
                 S::store(columns[at..][..S::LANES].as_mut_ptr(), sum);
             }
             let means = &mut means[line * *length + 1..];
-            for x in (0..clean.len()).step_by(S::LANES) {
-                let mut own_clean = Lanes::ZERO;
-                if let Some(clean) = clean.get(x..x + S::LANES) {
+            for x in (0..spoilt.len()).step_by(S::LANES) {
+                let mut own = Lanes::ZERO;
+                if let Some(spoilt) = spoilt.get(x..x + S::LANES) {
                     // So many are converted together.
                     for lane in 0..S::LANES {
-                        own_clean.0[lane] = clean[lane].into();
+                        own.0[lane] = spoilt[lane].into();
                     }
                 } else {
-                    for (to, clean) in own_clean.0.iter_mut().zip(&clean[x..]) {
-                        *to = (*clean).into();
+                    for (to, spoilt) in own.0.iter_mut().zip(&spoilt[x..]) {
+                        *to = (*spoilt).into();
                     }
                 }
-                let is_clean = S::lt(S::splat(0.0), own_clean.load::<S>());
+                let is_spoilt = S::lt(S::splat(0.0), own.load::<S>());
                 let [left, own, right] =
                     [x, x + 1, x + 2].map(|column| columns[column..][..S::LANES].as_ptr());
                 let sum = S::add(S::add(S::load(left), S::load(own)), S::load(right));
-                let mean = S::select(is_clean, S::div(sum, S::splat(NEXT)), S::splat(f32::NAN));
+                let mean = S::select(is_spoilt, S::splat(f32::NAN), S::div(sum, S::splat(NEXT)));
                 S::store(means[x..][..S::LANES].as_mut_ptr(), mean);
             }
         }

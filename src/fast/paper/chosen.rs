@@ -1,6 +1,6 @@
 //! Writes the normals of the pixels of a row that take even windows, fast: the plain form is `SecondPass::chosen`.
 
-use crate::cloud::Normals;
+use crate::cloud::{Normals, Points};
 use crate::fast::arithmetic::Floats;
 use crate::fast::lanes::LANES;
 use crate::fast::tile::{Bits, turned};
@@ -15,6 +15,8 @@ pub(super) struct ChosenRow<'a> {
     pub second_pass: &'a SecondPass,
     pub normals: &'a Normals<'a>,
     pub y: usize,
+    /// The points, if pixels that could take a window but take none are to be written too.
+    pub of_left: Option<&'a Points<'a>>,
 }
 
 impl ChosenRow<'_> {
@@ -24,9 +26,10 @@ impl ChosenRow<'_> {
     /// The processor has the instruction set of `S`; the row is inside the normals, and no other thread writes it.
     #[inline(always)]
     pub unsafe fn write<S: Along>(&self) {
-        let &ChosenRow { cloud, options, second_pass, normals, y } = self;
+        let &ChosenRow { cloud, options, second_pass, normals, y, of_left } = self;
         let (first, of_even) = (y * cloud.width, second_pass.of_even());
         let choices = &second_pass.choices()[first..][..cloud.width];
+        let concerned = &second_pass.concerned()[first..][..cloud.width];
         let whole = cloud.width / S::LANES * S::LANES;
         for x in (0..whole).step_by(S::LANES) {
             let (mut places, mut lanes) = ([0; LANES], 0);
@@ -34,6 +37,15 @@ impl ChosenRow<'_> {
                 let is_chosen = *choice != NO_WINDOW;
                 places[lane] = if is_chosen { *choice as usize } else { 0 };
                 lanes |= u32::from(is_chosen) << lane;
+            }
+            if of_left.is_some() {
+                let mut left = 0;
+                for (lane, concerned) in concerned[x..][..S::LANES].iter().enumerate() {
+                    left |= u32::from(*concerned) << lane;
+                }
+                for lane in Bits(left & !lanes) {
+                    self.write_one(x + lane);
+                }
             }
             if lanes == 0 {
                 continue;
@@ -64,10 +76,19 @@ impl ChosenRow<'_> {
             }
         }
         for x in whole..cloud.width {
-            if let Some(found) = second_pass.chosen(cloud, options, first + x) {
-                // SAFETY: as the caller's.
-                unsafe { normals.write(x, y, found.normal, found.curvature) };
-            }
+            self.write_one(x);
+        }
+    }
+
+    /// Writes the normal in a column.
+    #[cold]
+    fn write_one(&self, x: usize) {
+        let &ChosenRow { cloud, options, second_pass, normals, y, of_left } = self;
+        let at = y * cloud.width + x;
+        let left = || second_pass.left(of_left?, options, at);
+        if let Some(found) = second_pass.chosen(cloud, options, at).or_else(left) {
+            // SAFETY: as the caller's of `write`.
+            unsafe { normals.write(x, y, found.normal, found.curvature) };
         }
     }
 }

@@ -3,7 +3,8 @@
 use crate::cloud::{PointRow, Points};
 use crate::fast::lanes::{LANES, Lanes};
 use crate::options::{Depth, Options};
-use crate::simd::Along;
+use crate::paper::BLOCK;
+use crate::simd::{Along, load_by_fours};
 
 /// Elements of a row of depths: the width, and a pair of groups of NaN or more behind it.
 pub(crate) fn row_length(width: usize) -> usize {
@@ -48,20 +49,72 @@ pub(crate) unsafe fn read<S: Along>(
     }
 }
 
-/// Reads a row of points and their depths, distances from the origin where `range` says so.
+/// Rows of points, `BLOCK` or those that are left, where they are read from and to.
+pub(crate) struct PointRows<'a> {
+    pub rows: &'a mut dyn Iterator<Item = (PointRow<'a>, &'a mut [[f32; 3]], &'a mut [f32])>,
+    /// As [`Cloud::sums`](crate::paper::Cloud::sums).
+    pub sums: &'a mut [[f32; 4]],
+    /// Room for sums down the columns, as [`room_for_columns`] says.
+    pub columns: &'a mut [f32],
+}
+
+/// What [`PointRows::columns`] holds for blocks of this number.
+pub(crate) fn room_for_columns(across: usize) -> usize {
+    4 * BLOCK * across.next_multiple_of(LANES)
+}
+
+impl PointRows<'_> {
+    /// Reads points and their depths, distances from the origin where `range` says so, and sums the blocks.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn read<S: Along>(self, options: &Options, range: bool) {
+        let PointRows { rows, sums, columns } = self;
+        let plane = BLOCK * sums.len().next_multiple_of(LANES);
+        let columns = &mut columns[..4 * plane];
+        columns.fill(0.0);
+        for (row, to, depths) in rows {
+            // SAFETY: as the caller's; there is room for a plane of as many columns as the blocks have.
+            unsafe { read_points::<S>(&row, options, range, to, depths, columns) };
+        }
+        let columns = columns.as_ptr();
+        for (group, sums) in sums.chunks_mut(S::LANES).enumerate() {
+            let mut fields = [Lanes::ZERO; 4];
+            for field in 0..4 {
+                // SAFETY: as the caller's; planes have room for whole groups of blocks.
+                unsafe {
+                    let first = columns.add(field * plane + group * S::LANES * BLOCK);
+                    let [a, b, c, d] = load_by_fours::<S>(|lane| first.add(lane * BLOCK));
+                    let sum = S::add(S::add(S::add(a, b), c), d);
+                    S::store(fields[field].0.as_mut_ptr(), sum);
+                }
+            }
+            for (lane, sum) in sums.iter_mut().enumerate() {
+                *sum = fields.map(|field| field.0[lane]);
+            }
+        }
+    }
+}
+
+/// Reads a row of points and their depths, and adds them to the sums of four fields' columns.
 ///
 /// # Safety
-/// The processor has the instruction set of `S`.
+/// The processor has the instruction set of `S`; there is room for whole groups of columns.
 #[inline(always)]
-pub(crate) unsafe fn read_points<S: Along>(
+unsafe fn read_points<S: Along>(
     row: &PointRow,
     options: &Options,
     range: bool,
     to: &mut [[f32; 3]],
     depths: &mut [f32],
+    columns: &mut [f32],
 ) {
     let width = to.len();
     let depths = &mut depths[..width];
+    let plane = columns.len() / 4;
+    assert!(width.next_multiple_of(S::LANES) <= plane);
+    let columns = columns.as_mut_ptr();
     for x in (0..width).step_by(S::LANES) {
         // SAFETY: as the caller's; all of the lanes, or as many as there is room for, are stored.
         unsafe {
@@ -69,6 +122,11 @@ pub(crate) unsafe fn read_points<S: Along>(
             let (none, there) = (S::splat(f32::NAN), there::<S>(point, options));
             let depth = S::select(there, depth::<S>(point, range), none);
             let mut fields = [depth; 4];
+            let [px, py, pz] = point;
+            for (field, value) in [px, py, pz, S::splat(1.0)].into_iter().enumerate() {
+                let sum = columns.add(field * plane + x);
+                S::store(sum, S::add(S::load(sum), S::and(there, value)));
+            }
             for c in 0..3 {
                 fields[c] = S::select(there, point[c], none);
             }

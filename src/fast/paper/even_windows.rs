@@ -32,14 +32,18 @@ pub(super) struct Even<'a> {
     pub asked: &'a Asked<'a>,
     /// Block by block.
     pub windows: Parts<EvenWindow>,
-    /// For their normals, and for those of windows of the tile's radii, if they are asked for.
-    pub normals: Option<[Sink<'a>; 2]>,
+    /// For their normals, if they are asked for.
+    pub normals: Option<Sink<'a>>,
 }
 
-/// A rectangle of the image whose blocks' even windows are found together.
+/// A rectangle of the image whose blocks' even windows are found together, and the normals of pixels that take none.
 pub(super) struct EvenTile<'a, F> {
     pub even: &'a Even<'a>,
+    pub tile: Tile<'a, F>,
+    /// The same, of blocks.
     pub blocks: Tile<'a, F>,
+    /// For the pixels' normals, if they are asked for.
+    pub sink: Option<&'a Sink<'a>>,
 }
 
 /// Eight blocks of a row.
@@ -131,7 +135,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
     /// as [`Tile::compute`].
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`; no one else writes the tile's blocks.
+    /// The processor has the instruction set of `S`; no one else writes the tile's blocks and pixels.
     #[inline(always)]
     pub unsafe fn compute<S: Groups>(
         &self,
@@ -139,28 +143,36 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
         layer: &Layer,
         waiting: &mut Waiting,
     ) -> Option<f32> {
-        let tile = &self.blocks;
+        let EvenTile { even, tile, sink, .. } = self;
         let method = CovarianceMatrix::about(layer.origin);
         // SAFETY: as the caller's.
         let mut next = unsafe { tile.start::<S, CovarianceMatrix, MOMENTS>(rings, layer) };
-        tile.start_waiting(layer, waiting);
-        let (mut of_samples, mut of_even) = (Run::default(), Run::default());
+        if sink.is_some() {
+            tile.start_waiting(layer, waiting);
+        }
+        let (mut of_pixels, mut of_even) = (Run::default(), Run::default());
         let mut some_wait = false;
-        for first in tile.rows.clone().step_by(BLOCK) {
-            let y = middle(first, BLOCK, self.even.cloud.height);
+        for y in tile.rows.clone() {
+            let first = y / BLOCK * BLOCK;
+            let has_middles = y == middle(first, BLOCK, even.cloud.height);
+            if sink.is_none() && !has_middles {
+                continue;
+            }
             // SAFETY: as the caller's.
             unsafe {
                 let error = tile.advance::<S, _, MOMENTS>(&method, rings, &mut next, y);
-                if let Some([_, sink]) = &self.even.normals {
-                    let run = &mut of_samples;
+                if let Some(sink) = sink {
+                    let run = &mut of_pixels;
                     tile.row::<S, CovarianceMatrix, MOMENTS, true>(
-                        rings, waiting, sink, run, first, error,
+                        rings, waiting, sink, run, y, error,
                     );
                 }
-                some_wait |= self.row::<S>(rings, &method, &mut of_even, first, error);
+                if has_middles {
+                    some_wait |= self.row::<S>(rings, &method, &mut of_even, first, error);
+                }
             }
         }
-        some_wait |= self.even.normals.is_some() && waiting.is_any();
+        some_wait |= sink.is_some() && waiting.is_any();
         (layer.hides_some() && some_wait).then_some(rings.nearest_hidden)
     }
 
@@ -214,7 +226,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
                     }
                 }
             }
-            if let Some([sink, _]) = &self.even.normals {
+            if let Some(sink) = &self.even.normals {
                 // SAFETY: as the caller's.
                 unsafe {
                     self.blocks
@@ -240,17 +252,15 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
         run: &mut Run<Matrices>,
         group: usize,
     ) -> (u32, u32) {
-        let Even { cloud, asked: Asked { clean: clean_radii, wanted: wanted_radii, .. }, .. } =
-            self.even;
+        let Even { cloud, asked: windows_asked, .. } = self.even;
         let &Eight { pixels, block, asked, .. } = eight;
         let y = rings.aimed.y;
         let hides_some = rings.layer.hides_some();
-        let clean_radii = &clean_radii[y * cloud.width..][..cloud.width];
         let [mut wanted, mut clean, mut largest] = [[0.0; GROUP]; 3];
         for lane in Bits(asked) {
-            wanted[lane] = wanted_radii[block + lane] as f32;
-            clean[lane] = clean_radii[(pixels.x + lane * BLOCK).min(cloud.width - 1)].into();
-            largest[lane] = (self.even.asked.largest(block + lane) as f32).min(clean[lane]);
+            wanted[lane] = windows_asked.wanted[block + lane] as f32;
+            clean[lane] = windows_asked.clean.radii[block + lane].into();
+            largest[lane] = (windows_asked.largest(block + lane) as f32).min(clean[lane]);
         }
         // SAFETY: as the caller's.
         unsafe {

@@ -18,7 +18,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use chosen::ChosenRow;
-use depths::row_length;
+use depths::{PointRows, room_for_columns, row_length};
 use even_windows::{Even, EvenTile};
 use integrals::{Rings, elements_of_rings, presence_of_rings, reached, rows_of_rings};
 use layers::{Layer, Waiting};
@@ -31,7 +31,7 @@ use super::paths::{self, Task};
 use super::sink::Sink;
 use super::{Parts, lock};
 use crate::Error;
-use crate::cloud::{Normals, PointRow, Points};
+use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::memory::{bytes, make_room, resize};
 use crate::options::{DistanceMetric, Method, Options, Semantics};
@@ -84,6 +84,7 @@ pub(crate) struct WorkerScratch {
     depth_changes: Rings<4>,
     waiting: Waiting,
     choices: choices::Scratch,
+    columns: Buffer<f32>,
 }
 
 impl WorkerScratch {
@@ -95,6 +96,7 @@ impl WorkerScratch {
             + self.depth_changes.size()
             + self.waiting.size()
             + self.choices.size()
+            + self.columns.size()
     }
 }
 
@@ -137,21 +139,24 @@ pub(crate) fn compute_own(
     normals: &Normals,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
-    let largest = job.own_radii(scratch, choices);
+    let largest = job.own_radii(scratch, choices, |choice| *choice != NO_WINDOW);
     job.tiles(scratch, indices, normals, largest, 1)
 }
 
-/// Writes the normals of the pixels that take even windows.
+/// Writes the normals of the pixels that take even windows; and, if they have not been written yet, those of pixels that
+/// could but take none.
 pub(crate) fn write_chosen(
     job: &Job,
     second_pass: &SecondPass,
     cloud: &Cloud,
     normals: &Normals,
+    are_left: bool,
     workers: &Workers,
 ) {
-    let options = job.options;
+    let &Job { points, options, .. } = job;
+    let of_left = are_left.then_some(points);
     workers.for_each(cloud.height, |_, y| {
-        let row = ChosenRow { cloud, options, second_pass, normals, y };
+        let row = ChosenRow { cloud, options, second_pass, normals, y, of_left };
         // SAFETY: the processor has the instruction set, and every row falls to one thread.
         unsafe { paths::run(job.isa, ChosenTask { row }) };
     });
@@ -170,31 +175,56 @@ pub(crate) fn compute_of_blocks(
 }
 
 /// Makes a cloud that of the job's points, as [`Cloud::read`].
-pub(crate) fn read_cloud(job: &Job, cloud: &mut Cloud, workers: &Workers) -> Result<(), Error> {
+pub(crate) fn read_cloud(
+    job: &Job,
+    cloud: &mut Cloud,
+    scratch: &mut super::Scratch,
+) -> Result<(), Error> {
     let &Job { isa, points, options, whole_points } = job;
     cloud.resize(points, options)?;
-    let range = cloud.has_range;
-    let width = points.width();
-    let rows = cloud.points.chunks_mut(width).zip(cloud.depths.chunks_mut(width)).enumerate();
-    workers.each(rows, |(y, (to, depths))| {
-        let row = points.row(y, 0..width, whole_points);
-        // SAFETY: the processor has the instruction set.
-        unsafe { paths::run(isa, PointsTask { row, options, range, to, depths }) };
+    let super::Scratch { workers, each, .. } = scratch;
+    let &mut Cloud { width, height, has_range, .. } = cloud;
+    let across = Blocks::of(width, height).across;
+    for scratch in &each[..workers.count()] {
+        lock(scratch).paper.columns.grow(room_for_columns(across))?;
+    }
+    let rows = cloud.points.chunks_mut(BLOCK * width);
+    let rows = rows.zip(cloud.depths.chunks_mut(BLOCK * width));
+    let rows = rows.zip(cloud.sums.chunks_mut(across)).enumerate();
+    workers.share(rows, |worker, rows| {
+        let columns = &mut lock(&each[worker]).paper.columns;
+        for (row, ((to, depths), sums)) in rows {
+            let rows = to.chunks_mut(width).zip(depths.chunks_mut(width)).enumerate();
+            let mut rows = rows.map(|(line, (to, depths))| {
+                (points.row(row * BLOCK + line, 0..width, whole_points), to, depths)
+            });
+            let rows = PointRows { rows: &mut rows, sums, columns };
+            // SAFETY: the processor has the instruction set.
+            unsafe { paths::run(isa, PointsTask { rows, options, range: has_range }) };
+        }
     });
     Ok(())
 }
 
-/// Normals that are found along with even windows, by CM.
+/// What CM finds along with even windows.
 pub(crate) struct Along<'a> {
-    /// Those of the even windows.
+    /// The normals of the even windows, block by block.
     pub of_even: &'a Normals<'a>,
-    /// Those of other windows around the same pixels, of these radii, block by block, 0 for none.
-    pub samples: &'a [u32],
-    pub of_samples: &'a Normals<'a>,
+    /// In the paper's semantics those of the pixels that take none; the others are not written.
+    pub own: Option<Own<'a>>,
 }
 
-/// The even windows of all blocks; the job's method is CM. In the paper's semantics the depths are those that [`radii`] has
-/// read.
+/// Pixels' own normals.
+pub(crate) struct Own<'a> {
+    /// The pixels that are left out.
+    pub concerned: &'a [bool],
+    /// As [`compute`] has them.
+    pub indices: Option<&'a [i32]>,
+    pub normals: &'a Normals<'a>,
+}
+
+/// The even windows of all blocks, and what is to be found along with them; the job's method is CM. In the paper's semantics
+/// the depths and the pixels' own windows are those that [`radii`] has found. Afterwards there is room for [`choices`].
 pub(crate) fn even_windows(
     job: &Job,
     (cloud, asked): (&Cloud, &Asked),
@@ -205,13 +235,15 @@ pub(crate) fn even_windows(
     if job.options.semantics == Semantics::Pcl {
         job.depths(scratch)?;
     }
+    for scratch in &scratch.each[..scratch.workers.count()] {
+        lock(scratch).paper.choices.reserve(cloud.width, asked.limit)?;
+    }
     resize(windows, asked.blocks.count(), EvenWindow::default())?;
     let largest = (0..windows.len()).map(|block| asked.largest(block)).max().unwrap_or(0) as usize;
-    let samples = along.as_ref().map_or(&[][..], |along| along.samples);
-    let largest = job.radii_of_blocks(scratch, samples)?.max(largest);
     let windows = Parts(windows.as_mut_ptr());
-    let normals = along.map(|along| [along.of_even, along.of_samples].map(Sink::All));
-    job.even_tiles(scratch, &Even { cloud, asked, windows, normals }, largest)
+    let normals = along.as_ref().map(|along| Sink::All(along.of_even));
+    let own = along.and_then(|along| along.own);
+    job.even_tiles(scratch, &Even { cloud, asked, windows, normals }, own, largest)
 }
 
 /// The block whose even window each pixel takes, where there is one; the others' choices stay.
@@ -220,14 +252,14 @@ pub(crate) fn choices(
     even: &EvenWindows,
     choices: &mut [u32],
     scratch: &mut super::Scratch,
-) -> Result<(), Error> {
+) {
     let super::Scratch { workers, each, .. } = scratch;
     let rows = choices.chunks_mut(BLOCK * even.cloud.width).enumerate();
     workers.share(rows, |worker, rows| {
         let scratch = &mut lock(&each[worker]).paper.choices;
         // SAFETY: the processor has the instruction set.
         unsafe { paths::run(isa, ChoicesTask { even, rows, scratch }) }
-    })
+    });
 }
 
 /// Image rows that are swept together, with the rows around them whose depth changes reach them.
@@ -396,8 +428,13 @@ impl Job<'_> {
         Ok(largest.into_inner() as usize)
     }
 
-    /// Leaves out the pixels that take another window; gives the largest radius of the others.
-    fn own_radii(&self, scratch: &mut super::Scratch, choices: &[u32]) -> usize {
+    /// Leaves out the pixels of which `is_left_out` says so; gives the largest radius of the others.
+    fn own_radii<T: Sync>(
+        &self,
+        scratch: &mut super::Scratch,
+        of_pixels: &[T],
+        is_left_out: impl Fn(&T) -> bool + Sync,
+    ) -> usize {
         let width = self.points.width();
         let length = row_length(width);
         let super::Scratch { workers, paper: Scratch { radii, chunks, .. }, .. } = scratch;
@@ -409,8 +446,8 @@ impl Job<'_> {
             let row = unsafe { parts.part(at..at + width) };
             // As integers, radii are in the same order.
             let mut most = 0;
-            for (radius, choice) in row.iter_mut().zip(&choices[y * width..]) {
-                *radius = if *choice == NO_WINDOW { *radius } else { -1.0 };
+            for (radius, of_pixel) in row.iter_mut().zip(&of_pixels[y * width..]) {
+                *radius = if is_left_out(of_pixel) { -1.0 } else { *radius };
                 most = most.max(radius.to_bits() as i32);
             }
             largest.fetch_max(f32::from_bits(most as u32) as u32, Ordering::Relaxed);
@@ -496,32 +533,40 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// The even windows, and normals by CM, tile by tile; no window's radius is above `largest`.
+    /// The even windows, and normals by CM, tile by tile; the even windows' radii are not above `largest`.
     #[inline(never)]
     fn even_tiles(
         &self,
         scratch: &mut super::Scratch,
         even: &Even,
+        own: Option<Own>,
         largest: usize,
     ) -> Result<(), Error> {
         let &Job { points, options, whole_points, .. } = self;
-        let super::Scratch { workers, each, paper, .. } = scratch;
+        let of_own = own.as_ref().map_or(0, |own| self.own_radii(scratch, own.concerned, |is| *is));
+        let largest = largest.max(of_own);
+        let super::Scratch { workers, each, listed, paper, .. } = scratch;
         let (width, height) = (points.width(), points.height());
-        let row = |y: usize| self.row(paper, BLOCK, y);
+        let sink = own.map(|own| Sink::new(own.normals, own.indices, width, listed)).transpose()?;
+        let length = row_length(width);
+        let row = |y: usize| match sink {
+            Some(_) => self.row(paper, 1, y),
+            None => (&paper.depths[y * length..][..length], &[][..]),
+        };
         let grid = Grid::new(width, height, largest, Rings::<MOMENTS>::COLUMN);
         let room = grid.room(options.paper.largest_radius, elements_of_rings);
         for scratch in &each[..workers.count()] {
             let WorkerScratch { moments, waiting, .. } = &mut lock(scratch).paper;
-            waiting.reserve(width.div_ceil(BLOCK), grid.rows.div_ceil(BLOCK))?;
+            waiting.reserve(width, grid.rows)?;
             moments.reserve(room)?;
         }
         workers.for_each(grid.count(), |worker, item| {
             let Some((columns, rows)) = grid.tile(item) else { return };
-            let step = BLOCK;
-            let blocks = Tile { points, options, columns, rows, whole_points, largest, step, row };
-            let tile = EvenTile { even, blocks };
+            let tile = Tile { points, options, columns, rows, whole_points, largest, step: 1, row };
+            let blocks = Tile { step: BLOCK, ..tile.clone() };
+            let tile = EvenTile { even, blocks, tile, sink: sink.as_ref() };
             let WorkerScratch { moments: rings, waiting, .. } = &mut lock(&each[worker]).paper;
-            each_layer(&tile.blocks, &paper.ranges, span(options.method), |layer| {
+            each_layer(&tile.tile, &paper.ranges, span(options.method), |layer| {
                 let tile = &tile;
                 // SAFETY: the processor has the instruction set, and tiles do not share pixels.
                 unsafe { paths::run(self.isa, EvenTask { tile, layer, rings, waiting }) }
@@ -589,13 +634,11 @@ impl Task for DepthsTask<'_> {
     }
 }
 
-/// A row of points and depths.
+/// Rows of points and depths.
 struct PointsTask<'a> {
-    row: PointRow<'a>,
+    rows: PointRows<'a>,
     options: &'a Options,
     range: bool,
-    to: &'a mut [[f32; 3]],
-    depths: &'a mut [f32],
 }
 
 impl Task for PointsTask<'_> {
@@ -603,9 +646,9 @@ impl Task for PointsTask<'_> {
 
     #[inline(always)]
     unsafe fn run<S: Groups>(self) {
-        let PointsTask { row, options, range, to, depths } = self;
+        let PointsTask { rows, options, range } = self;
         // SAFETY: as the caller's.
-        unsafe { depths::read_points::<S::Widest>(&row, options, range, to, depths) };
+        unsafe { rows.read::<S::Widest>(options, range) };
     }
 }
 
@@ -710,10 +753,10 @@ struct ChoicesTask<'a, 'c> {
 }
 
 impl Task for ChoicesTask<'_, '_> {
-    type Output = Result<(), Error>;
+    type Output = ();
 
     #[inline(always)]
-    unsafe fn run<S: Groups>(self) -> Result<(), Error> {
+    unsafe fn run<S: Groups>(self) {
         // SAFETY: as the caller's.
         unsafe { choices::rows::<S>(self.even, self.rows, self.scratch) }
     }

@@ -20,6 +20,7 @@ use crate::paper::{CleanPoints, Cleaned, Rect, middle, plain_estimate, window};
 use crate::simd::{GROUP, Groups};
 
 /// A rectangle of the image whose normals are computed together.
+#[derive(Clone)]
 pub(crate) struct Tile<'a, F> {
     pub points: &'a Points<'a>,
     pub options: &'a Options,
