@@ -299,7 +299,7 @@ impl Estimator {
         }
         let job = Job { points, whole_points, ..job };
         // CM's sums are those of even windows too.
-        let is_along = !is_plain && !is_pcl && options.method == Method::CovarianceMatrix;
+        let is_along = !is_plain && options.is_cm_of_paper();
         let own = is_along.then_some((indices, normals));
         let mut engine = Engine { job, scratch, own, is_plain };
         second_pass.compute(cloud, options, &mut engine)?;
@@ -440,7 +440,10 @@ impl paper::Engine for Engine<'_> {
                 let side = |at: usize| plain.window_side(at % width, at / width) as f32;
                 refill(sizes, (0..width * height).map(side))
             }
-            (Semantics::Pcl, false) => fast::sides(isa, points, options, sizes, scratch),
+            (Semantics::Pcl, false) => {
+                fast::paper::depths(&job, scratch)?;
+                fast::sides(isa, points, options, sizes, scratch)
+            }
             (_, true) => {
                 let maps = PaperMaps::new(points, options)?;
                 refill(sizes, maps.smoothing_radii.iter().map(|radius| radius.trunc()))

@@ -261,6 +261,11 @@ impl Options {
         self.one_sided_windows || self.crease_windows
     }
 
+    /// Whether the method is the paper's CM.
+    pub(crate) fn is_cm_of_paper(&self) -> bool {
+        self.semantics == Semantics::Paper && self.method == Method::CovarianceMatrix
+    }
+
     /// `BORDER_POLICY_IGNORE`: how many rows and columns at each border get no normal.
     pub(crate) fn ignored_border(&self) -> usize {
         match self.border_policy {

@@ -7,24 +7,37 @@ use super::summed_area::SummedArea;
 use crate::Error;
 use crate::threads::Workers;
 
-/// Integral images of the blocks' points, and of the normals of one window around each block, which are made from them.
+/// Integral images of normals, one for each block.
 #[derive(Debug, Default)]
 pub(crate) struct SummedNormals {
-    /// x, y, z, and how many there are.
-    points: SummedArea<4>,
     normals: SummedArea<4>,
+    /// Of the blocks' points, which they can be made from: x, y, z, and how many there are.
+    points: SummedArea<4>,
 }
 
 /// The sum of some points, and their number.
 type Sum = [f64; 4];
 
 impl SummedNormals {
-    /// Becomes those of a cloud, with windows of these radii; 0 for none.
+    /// Sums others; NaN where there is none.
     pub fn sum(
+        &mut self,
+        estimates: &[[f32; 4]],
+        blocks: &Blocks,
+        workers: &Workers,
+    ) -> Result<(), Error> {
+        self.normals.sum_up(blocks.across, blocks.down, workers, |(column, row)| {
+            let [x, y, z, _] = estimates[row * blocks.across + column];
+            if x.is_nan() { [0.0; 4] } else { [x, y, z, 1.0].map(f64::from) }
+        })
+    }
+
+    /// Sums those across the mean 3-D gradients of a cloud in windows of these radii around the blocks; 0 for none.
+    pub fn sum_gradients(
         &mut self,
         cloud: &Cloud,
         blocks: &Blocks,
-        radius: impl Fn((usize, usize)) -> u32 + Sync,
+        radius: impl Fn(usize) -> u32 + Sync,
         workers: &Workers,
     ) -> Result<(), Error> {
         let (across, down) = (blocks.across, blocks.down);
@@ -33,7 +46,7 @@ impl SummedNormals {
         })?;
         let points = &self.points;
         self.normals.sum_up(across, down, workers, |block| {
-            let halves = match radius(block) {
+            let halves = match radius(block.1 * across + block.0) {
                 0 => return [0.0; 4],
                 radius if radius <= MIDDLE as u32 => halves_of_block(cloud, blocks, block),
                 radius => halves_around(points, blocks, block, radius),

@@ -82,8 +82,8 @@ pub(crate) struct SecondPass {
     concerned: Vec<bool>,
     levels: Vec<u8>,
     choices: Vec<u32>,
-    /// The radii of the even windows that some pixel takes.
-    taken: Vec<u32>,
+    /// Those of windows around the blocks' middle pixels whose estimates are asked for, 0 for none.
+    radii: Vec<u32>,
 }
 
 /// As often as a radius can be halved.
@@ -102,7 +102,7 @@ impl SecondPass {
             + bytes(&self.concerned)
             + bytes(&self.levels)
             + bytes(&self.choices)
-            + bytes(&self.taken)
+            + bytes(&self.radii)
     }
 
     /// Finds which even windows the pixels of other points take, and their estimates.
@@ -112,7 +112,9 @@ impl SecondPass {
         options: &Options,
         engine: &mut impl Engine,
     ) -> Result<(), Error> {
-        let SecondPass { depth_changes, wanted, windows, normals, concerned, levels, .. } = self;
+        let SecondPass {
+            depth_changes, wanted, windows, normals, concerned, levels, radii, ..
+        } = self;
         engine.sizes(&mut windows.sizes)?;
         if !options.has_second_pass() {
             return refill(&mut self.choices, repeat_n(NO_WINDOW, cloud.depths.len()));
@@ -128,7 +130,15 @@ impl SecondPass {
         let asked = Asked { blocks, wanted, clean, limit, least_noise };
         if options.crease_windows {
             let radius = |block| sample_radius(&windows.sizes, cloud, &blocks, block, options);
-            normals.sum(cloud, &blocks, radius, engine.workers())?;
+            // Mean 3-D gradients vary as much as CM's normals do, and need none of its sums; the other methods' own normals
+            // tell more.
+            if options.is_cm_of_paper() {
+                normals.sum_gradients(cloud, &blocks, radius, engine.workers())?;
+            } else {
+                refill(radii, (0..blocks.count()).map(radius))?;
+                engine.of_blocks(&blocks, radii, &mut windows.of_even)?;
+                normals.sum(&windows.of_even, &blocks, engine.workers())?;
+            }
         }
         refill(concerned, repeat_n(false, cloud.depths.len()))?;
         refill(levels, repeat_n(0, blocks.count()))?;
@@ -142,16 +152,15 @@ impl SecondPass {
         let even = EvenWindows { cloud, asked: &asked, options, concerned, levels, windows };
         engine.choices(&even, &mut self.choices);
         if options.method != Method::CovarianceMatrix {
-            let taken = &mut self.taken;
-            refill(taken, repeat_n(0, blocks.count()))?;
+            refill(radii, repeat_n(0, blocks.count()))?;
             // Marked first, as many pixels take the same.
             for block in self.choices.iter().filter(|choice| **choice != NO_WINDOW) {
-                taken[*block as usize] = 1;
+                radii[*block as usize] = 1;
             }
-            for (block, radius) in taken.iter_mut().enumerate().filter(|(_, taken)| **taken > 0) {
+            for (block, radius) in radii.iter_mut().enumerate().filter(|(_, taken)| **taken > 0) {
                 *radius = even.radius(block);
             }
-            engine.of_blocks(&blocks, taken, of_even)?;
+            engine.of_blocks(&blocks, radii, of_even)?;
         }
         // A window may have no normal: but for rare ones, those that no pixel takes.
         let has_none = |block: usize| of_even[block][0].is_nan();
@@ -332,10 +341,10 @@ fn sample_radius(
     sizes: &[f32],
     cloud: &Cloud,
     blocks: &Blocks,
-    block: (usize, usize),
+    block: usize,
     options: &Options,
 ) -> u32 {
-    let pixels = blocks.pixels(block);
+    let pixels = blocks.pixels((block % blocks.across, block / blocks.across));
     let middle = pixels[MIDDLE * BLOCK + MIDDLE];
     if cloud.is_missing(middle) {
         return 0;

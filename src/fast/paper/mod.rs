@@ -34,7 +34,7 @@ use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::memory::{bytes, make_room, resize};
-use crate::options::{DistanceMetric, Method, Options, Semantics};
+use crate::options::{DistanceMetric, Method, Options};
 use crate::paper::{
     Asked, BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, NO_WINDOW, PaperMaps, SecondPass,
 };
@@ -112,7 +112,12 @@ pub(crate) fn compute(
     job.tiles(scratch, indices, normals, largest, 1)
 }
 
-/// The radii of all pixels' windows, row by row, 0 for none.
+/// Reads the depths for [`even_windows`] and [`compute_of_blocks`].
+pub(crate) fn depths(job: &Job, scratch: &mut super::Scratch) -> Result<(), Error> {
+    job.depths(scratch)
+}
+
+/// Reads the depths, and finds the radii of all pixels' windows, row by row, 0 for none.
 pub(crate) fn radii(
     job: &Job,
     found: &mut Vec<f32>,
@@ -162,8 +167,8 @@ pub(crate) fn write_chosen(
     });
 }
 
-/// The normals of the blocks whose middle pixel has a window of one of these radii; NaN for the others. The depths are those
-/// that [`even_windows`] has read.
+/// The normals of the blocks whose middle pixel has a window of one of these radii; NaN for the others. The depths have
+/// been read.
 pub(crate) fn compute_of_blocks(
     job: &Job,
     radii: &[u32],
@@ -223,8 +228,8 @@ pub(crate) struct Own<'a> {
     pub normals: &'a Normals<'a>,
 }
 
-/// The even windows of all blocks, and what is to be found along with them; the job's method is CM. In the paper's semantics
-/// the depths and the pixels' own windows are those that [`radii`] has found. Afterwards there is room for [`choices`].
+/// The even windows of all blocks, and what is to be found along with them; the job's method is CM. The depths have been
+/// read, and the pixels' own windows are those that [`radii`] has found. Afterwards there is room for [`choices`].
 pub(crate) fn even_windows(
     job: &Job,
     (cloud, asked): (&Cloud, &Asked),
@@ -232,9 +237,6 @@ pub(crate) fn even_windows(
     along: Option<Along>,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
-    if job.options.semantics == Semantics::Pcl {
-        job.depths(scratch)?;
-    }
     for scratch in &scratch.each[..scratch.workers.count()] {
         lock(scratch).paper.choices.reserve(cloud.width, asked.limit)?;
     }
