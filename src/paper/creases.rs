@@ -134,3 +134,37 @@ fn minus(a: Sum, b: Sum) -> Sum {
 fn plus(a: Sum, b: Sum) -> Sum {
     std::array::from_fn(|i| a[i] + b[i])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::Points;
+    use crate::options::Options;
+
+    /// A cloud whose depths are a function of the column, with some points missing.
+    fn cloud(depth: impl Fn(f32) -> f32) -> Cloud {
+        let (width, height) = (90, 61);
+        let point = |at: usize| {
+            let [x, y] = [at % width, at / width].map(|line| 0.01 * line as f32);
+            if at % 11 == 3 { [f32::NAN; 3] } else { [x, y, depth(x)] }
+        };
+        let points: Vec<_> = (0..width * height).flat_map(point).collect();
+        let points = Points::interleaved(&points, width, height, 3, 0).unwrap();
+        Cloud::new(&points, &Options::default()).unwrap()
+    }
+
+    #[test]
+    fn gradients_vary_at_creases_only() {
+        for (bend, varies) in [(0.0, false), (0.5, true)] {
+            let cloud = cloud(|x| 2.0 + 0.3 * x + bend * (x - 0.45).abs());
+            let blocks = Blocks::of(cloud.width, cloud.height);
+            let mut normals = SummedNormals::default();
+            for radius in [1, 2, 3, 7, 8, 20] {
+                normals.sum_gradients(&cloud, &blocks, |_| radius, &Workers::default()).unwrap();
+                let vary_in = |x| normals.vary_in(&Rect { x, y: 0..cloud.height });
+                assert_eq!(vary_in(25..65), varies, "radius {radius}");
+                assert!(!vary_in(0..20), "radius {radius}");
+            }
+        }
+    }
+}

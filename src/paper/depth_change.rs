@@ -256,3 +256,46 @@ fn for_each_mark(row: &mut [bool], mut visit: impl FnMut(usize, &mut bool)) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Marks a share of the pixels, none if `seed` is 0.
+    fn marks(width: usize, height: usize, seed: usize) -> Vec<bool> {
+        (0..width * height).map(|i| (i * 7919 + seed * 104_729) % 97 < seed % 3).collect()
+    }
+
+    #[test]
+    fn clean_radii_are_chessboard_distances() {
+        let sizes = [(1, 1), (1, 9), (9, 1), (7, 5), (31, 23), (64, 48)];
+        for (seed, (width, height)) in sizes.into_iter().cycle().take(30).enumerate() {
+            let (right, below) = (marks(width, height, seed), marks(width, height, seed + 2));
+            let mut changes = DepthChanges { right, below, ..DepthChanges::default() };
+            for limit in [1, 4, 20, 100] {
+                let found = changes.clean((width, height), limit, &Workers::default()).unwrap();
+                let Clean { spoilt, radii } = found;
+                let (spoilt, radii) = (spoilt.to_vec(), radii.to_vec());
+                let is_spoilt = |x: usize, y: usize| {
+                    let mut changes_near = Rect::around((x, y), 1, (width, height)).pixels();
+                    changes_near.any(|(cx, cy)| {
+                        let at = cy * width + cx;
+                        changes.right[at] && cx <= x || changes.below[at] && cy <= y
+                    })
+                };
+                let all = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+                for (x, y) in all() {
+                    assert_eq!(spoilt[y * width + x], is_spoilt(x, y));
+                }
+                let blocks = Blocks::of(width, height);
+                for (block, radius) in radii.iter().enumerate() {
+                    let (x, y) = blocks.middle(block);
+                    let spoilt = all().filter(|(x, y)| spoilt[y * width + x]);
+                    let steps = spoilt.map(|(ox, oy)| x.abs_diff(ox).max(y.abs_diff(oy))).min();
+                    let near = steps.filter(|steps| *steps < limit as usize);
+                    assert_eq!(*radius, near.map_or(LARGEST_CLEAN, |steps| steps as i16));
+                }
+            }
+        }
+    }
+}

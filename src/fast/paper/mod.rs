@@ -763,3 +763,37 @@ impl Task for ChoicesTask<'_, '_> {
         unsafe { choices::rows::<S>(self.even, self.rows, self.scratch) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clouds_are_read_as_in_the_plain_form() {
+        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+            for (width, height) in [(1, 1), (3, 2), (4, 4), (17, 9), (66, 5), (160, 30)] {
+                let value = |i: usize| match i * 7919 % 101 {
+                    0 => f32::NAN,
+                    value => value as f32 / 7.0 - 3.0,
+                };
+                let values: Vec<_> = (0..4 * width * height).map(value).collect();
+                let points = Points::interleaved(&values, width, height, 4, 0).unwrap();
+                let options = Options::default();
+                let mut scratch = super::super::Scratch::default();
+                scratch.prepare(1).unwrap();
+                for whole_points in [false, true] {
+                    let job = Job { isa, points: &points, options: &options, whole_points };
+                    let mut found = Cloud::default();
+                    read_cloud(&job, &mut found, &mut scratch).unwrap();
+                    let expected = Cloud::new(&points, &options).unwrap();
+                    let bits = |cloud: &Cloud| {
+                        let Cloud { points, depths, sums, .. } = cloud;
+                        let all = [points.as_flattened(), depths, sums.as_flattened()].concat();
+                        all.into_iter().map(f32::to_bits).collect::<Vec<_>>()
+                    };
+                    assert_eq!(bits(&found), bits(&expected), "{isa:?} {width} x {height}");
+                }
+            }
+        }
+    }
+}
