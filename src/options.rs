@@ -199,7 +199,7 @@ pub struct Options {
     /// two neighbours on its surface not in line with it; default off. Takes the sensor's [`PaperOptions::alpha`] and
     /// [`PaperOptions::largest_radius`] in either semantics.
     pub one_sided_windows: bool,
-    /// In a second pass moves windows off the places where the normals of the first vary strongly, so that edges
+    /// In a second pass moves windows off the places where the normals vary strongly, so that edges
     /// without a depth change stay sharp; default off. Takes the same two parameters in either semantics.
     pub crease_windows: bool,
 }

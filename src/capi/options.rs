@@ -387,7 +387,7 @@ pub unsafe extern "C" fn iine_estimator_set_one_sided_windows(
     unsafe { set(estimator, change) }
 }
 
-/// Whether a second pass moves windows off the places where the normals of the first vary strongly, so that edges
+/// Whether a second pass moves windows off the places where the normals vary strongly, so that edges
 /// without a depth change stay sharp: 0 (the default) or 1. With either semantics; takes the sensor's alpha from
 /// `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of `iine_estimator_set_paper_radii`.
 ///

@@ -66,7 +66,7 @@ pub(crate) struct EvenWindows<'a> {
     pub cloud: &'a Cloud,
     pub asked: &'a Asked<'a>,
     pub options: &'a Options,
-    /// The pixels that take one.
+    /// The pixels that may take one.
     pub concerned: &'a [bool],
     /// From how many radii at most the windows come that a block's pixels can take, starting with the largest and halving
     /// it, block by block; 0 for a block that takes none.

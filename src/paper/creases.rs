@@ -90,8 +90,8 @@ fn halves_of_block(cloud: &Cloud, blocks: &Blocks, block: (usize, usize)) -> [[S
     halves
 }
 
-/// The halves of the window of blocks around a block that is as large as that of a radius, without the block's own column or
-/// row. At the edges of the image the block stands for those beyond.
+/// The halves of the window of blocks around a block that is about as large as that of a radius, without the block's own
+/// column or row. At the edges of the image the block stands for those beyond.
 fn halves_around(
     points: &SummedArea<4>,
     blocks: &Blocks,
@@ -108,15 +108,18 @@ fn halves_around(
     let [top, above, below, bottom] = halves(row, blocks.down).map(|row| points.row(row));
     let columns = |x: usize| minus(bottom[x], top[x]);
     let rows = |row: &[Sum]| minus(row[x3], row[x0]);
-    let (first, last, height, width) = (columns(x0), columns(x3), rows(top), rows(bottom));
     [
-        [minus(columns(x1), first), minus(last, columns(x2))],
-        [minus(rows(above), height), minus(width, rows(below))],
+        [minus(columns(x1), columns(x0)), minus(columns(x3), columns(x2))],
+        [minus(rows(above), rows(top)), minus(rows(bottom), rows(below))],
     ]
 }
 
 /// Across the ways from the mean of the left half to that of the right one, and from above to below: the mean 3-D gradients.
 fn normal(halves: [[Sum; 2]; 2]) -> Option<[f64; 3]> {
+    // Of a half without points rounding may be left.
+    if halves.as_flattened().iter().any(|[_, _, _, count]| *count == 0.0) {
+        return None;
+    }
     // As long as the numbers of points make them: means would take divisions.
     let [u, v] = halves.map(|[[a, b, c, before], [d, e, f, behind]]| {
         [d * before - a * behind, e * before - b * behind, f * before - c * behind]
@@ -166,5 +169,14 @@ mod tests {
                 assert!(!vary_in(0..20), "radius {radius}");
             }
         }
+    }
+
+    #[test]
+    fn a_half_without_points_gives_no_normal() {
+        let below = [[0.0, 0.0, 2.0, 1.0], [0.0, 1.0, 2.0, 1.0]];
+        let there = [[0.0, 0.0, 2.0, 1.0], [1.0, 0.0, 2.0, 1.0]];
+        assert_eq!(normal([there, below]), Some([0.0, 0.0, -1.0]));
+        let rounding = [[1e-9, 2e-9, 3e-9, 0.0], there[1]];
+        assert_eq!(normal([rounding, below]), None);
     }
 }

@@ -22,8 +22,8 @@ use crate::threads::Workers;
 /// More than any window's radius. (Signed: every processor has the least of eight.)
 const LARGEST_CLEAN: i16 = i16::MAX / 2;
 
-/// What is looked at together of a row of sixteen-bit numbers.
-const TOGETHER: usize = 8;
+/// Sixteen-bit numbers of a row that are looked at together.
+const NUMBERS: usize = 8;
 
 /// Where there are depth changes, row by row; kept from frame to frame.
 #[derive(Debug, Default)]
@@ -165,10 +165,11 @@ impl DepthChanges {
         });
         // The chessboard distance: along the columns to all pixels, then along the rows to the blocks' middles.
         let reach = (limit as usize).min(width.max(height)).min(LARGEST_CLEAN as usize);
-        let stride = reach + width + reach + TOGETHER;
+        let beside = reach.min(width);
+        let stride = beside + width + beside + NUMBERS;
         refill(steps, repeat_n(LARGEST_CLEAN, height * stride))?;
         for (steps, spoilt) in steps.chunks_mut(stride).zip(spoilt.chunks(width)) {
-            for (to, spoilt) in steps[reach..].iter_mut().zip(spoilt) {
+            for (to, spoilt) in steps[beside..].iter_mut().zip(spoilt) {
                 *to = if *spoilt { 0 } else { LARGEST_CLEAN };
             }
         }
@@ -185,7 +186,7 @@ impl DepthChanges {
         workers.each(clean_radii.chunks_mut(blocks.across).enumerate(), |(row, radii)| {
             for (column, radius) in radii.iter_mut().enumerate() {
                 let (x, y) = blocks.middle(row * blocks.across + column);
-                let steps = least_steps_along(&steps[y * stride + x..], reach);
+                let steps = least_steps_along(&steps[y * stride + x..], beside);
                 *radius = if steps < reach as i16 { steps } else { LARGEST_CLEAN };
             }
         });
@@ -200,18 +201,18 @@ fn step_from(row: &mut [i16], next: &[i16]) {
     }
 }
 
-/// The chessboard distance of the pixel that is `reach` behind the first, by the steps along the columns of those around it;
-/// at most `reach`.
-fn least_steps_along(steps: &[i16], reach: usize) -> i16 {
-    let mut along = std::array::from_fn::<_, TOGETHER, _>(|i| i as i16 - reach as i16);
-    let mut least = [reach as i16; TOGETHER];
-    for steps in steps.chunks_exact(TOGETHER).take((2 * reach + 1).div_ceil(TOGETHER)) {
-        for i in 0..TOGETHER {
+/// The chessboard distance of the pixel that is `beside` behind the first, by the steps along the columns of those up to so
+/// far around it; more than any window's radius if there is none.
+fn least_steps_along(steps: &[i16], beside: usize) -> i16 {
+    let mut along = std::array::from_fn::<_, NUMBERS, _>(|i| i as i16 - beside as i16);
+    let mut least = [LARGEST_CLEAN; NUMBERS];
+    for steps in steps.chunks_exact(NUMBERS).take((2 * beside + 1).div_ceil(NUMBERS)) {
+        for i in 0..NUMBERS {
             least[i] = least[i].min(steps[i].max(along[i].abs()));
-            along[i] += TOGETHER as i16;
+            along[i] += NUMBERS as i16;
         }
     }
-    least.into_iter().fold(reach as i16, i16::min)
+    least.into_iter().fold(LARGEST_CLEAN, i16::min)
 }
 
 /// How much the inverse depth changes from pixel to pixel along the rows, axis 0, or the columns, in the plane that fits a
@@ -268,8 +269,8 @@ mod tests {
 
     #[test]
     fn clean_radii_are_chessboard_distances() {
-        let sizes = [(1, 1), (1, 9), (9, 1), (7, 5), (31, 23), (64, 48)];
-        for (seed, (width, height)) in sizes.into_iter().cycle().take(30).enumerate() {
+        let sizes = [(1, 1), (1, 9), (9, 1), (7, 5), (3, 150), (31, 23), (64, 48)];
+        for (seed, (width, height)) in sizes.into_iter().cycle().take(35).enumerate() {
             let (right, below) = (marks(width, height, seed), marks(width, height, seed + 2));
             let mut changes = DepthChanges { right, below, ..DepthChanges::default() };
             for limit in [1, 4, 20, 100] {

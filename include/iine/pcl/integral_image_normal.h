@@ -467,7 +467,7 @@ namespace iine
         options_.one_sided_windows = one_sided_windows;
       }
 
-      /** \brief Set whether a second pass moves windows off the places where the normals of the first vary strongly, so
+      /** \brief Set whether a second pass moves windows off the places where the normals vary strongly, so
         * that edges without a depth change stay sharp. With either semantics, and the alpha of \ref setPaperAlpha and
         * the largest radius of \ref setPaperRadii. Not in PCL's class.
         * \param[in] crease_windows whether it does; default false

@@ -481,7 +481,7 @@ impl<S: Along> Found<'_, S> {
 }
 
 impl Group<'_> {
-    /// Asks for the cache lines of the blocks' points, long before they are read.
+    /// Asks for the cache lines in which the blocks' lines of points start, long before they are read: neighbours have all.
     #[inline(always)]
     fn prefetch(&self) {
         let &Group { even, row, blocks } = self;

@@ -71,8 +71,8 @@ impl PointRows<'_> {
     #[inline(always)]
     pub unsafe fn read<S: Along>(self, options: &Options, range: bool) {
         let PointRows { rows, sums, columns } = self;
-        let plane = BLOCK * sums.len().next_multiple_of(LANES);
-        let columns = &mut columns[..4 * plane];
+        let columns = &mut columns[..room_for_columns(sums.len())];
+        let plane = columns.len() / 4;
         columns.fill(0.0);
         for (row, to, depths) in rows {
             // SAFETY: as the caller's; there is room for a plane of as many columns as the blocks have.
@@ -91,7 +91,7 @@ impl PointRows<'_> {
                 }
             }
             for (lane, sum) in sums.iter_mut().enumerate() {
-                *sum = fields.map(|field| field.0[lane]);
+                *sum = fields.each_ref().map(|field| field.0[lane]);
             }
         }
     }

@@ -36,7 +36,7 @@ pub(super) struct Even<'a> {
     pub normals: Option<Sink<'a>>,
 }
 
-/// A rectangle of the image whose blocks' even windows are found together, and the normals of pixels that take none.
+/// A rectangle of the image whose blocks' even windows are found together, and the normals of the pixels that may take none.
 pub(super) struct EvenTile<'a, F> {
     pub even: &'a Even<'a>,
     pub tile: Tile<'a, F>,

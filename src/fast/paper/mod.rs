@@ -215,7 +215,7 @@ pub(crate) fn read_cloud(
 pub(crate) struct Along<'a> {
     /// The normals of the even windows, block by block.
     pub of_even: &'a Normals<'a>,
-    /// In the paper's semantics those of the pixels that take none; the others are not written.
+    /// In the paper's semantics those of the pixels that may take none; the others are not written.
     pub own: Option<Own<'a>>,
 }
 
