@@ -317,11 +317,12 @@ impl Estimator {
                 fast::paper::compute_own(&job, choices, indices, normals, scratch)?;
             }
             let workers = scratch.workers();
+            let of_left = is_along.then_some(points);
             if indices.is_some() {
-                let left = |at| is_along.then(|| second_pass.left(points, options, at)).flatten();
+                let left = |at| second_pass.left(of_left?, options, at);
                 write(normals, indices, width, workers, |_, at| chosen(at).or_else(|| left(at)));
             } else {
-                fast::paper::write_chosen(&job, second_pass, cloud, normals, is_along, workers);
+                fast::paper::write_chosen(&job, second_pass, cloud, normals, of_left, workers);
             }
         }
         if options.one_sided_windows {

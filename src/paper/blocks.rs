@@ -32,9 +32,14 @@ impl Blocks {
         self.across * self.down
     }
 
+    /// A block's column and row, of blocks.
+    pub fn place(&self, block: usize) -> (usize, usize) {
+        (block % self.across, block / self.across)
+    }
+
     /// Column and row of a block's middle pixel.
     pub fn middle(&self, block: usize) -> (usize, usize) {
-        self.middle_of((block % self.across, block / self.across))
+        self.middle_of(self.place(block))
     }
 
     /// That of the block in a column and row of blocks.

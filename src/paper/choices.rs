@@ -84,8 +84,8 @@ impl EvenWindows<'_> {
     /// Calls `visit` with the blocks whose windows a block's pixels can take: itself, and those one radius away along
     /// the rows, the columns and both.
     fn for_each_place(&self, block: usize, mut visit: impl FnMut(usize)) {
-        let Blocks { across, down, .. } = self.asked.blocks;
-        let (x, y) = (block % across, block / across);
+        let blocks @ Blocks { across, down, .. } = self.asked.blocks;
+        let (x, y) = blocks.place(block);
         visit(block);
         let largest = self.asked.largest(block);
         // Smaller ones have the same places.
@@ -130,7 +130,7 @@ impl<'a> Candidates<'a> {
     fn of(even: &'a EvenWindows, block: usize) -> Self {
         let &EvenWindows { asked, .. } = even;
         let blocks = &asked.blocks;
-        let [column, row] = [block % blocks.across, block / blocks.across];
+        let (column, row) = blocks.place(block);
         let middle = [column, row].map(|line| line * BLOCK + MIDDLE);
         let (windows, noise) = (Vec::new(), f32::INFINITY);
         let mut found = Candidates { even, middle, windows, noise, is_exact: false };

@@ -19,7 +19,7 @@ pub(crate) struct Cloud {
     /// With some behind the last one, so that there are whole blocks of them.
     pub points: Vec<[f32; 3]>,
     pub depths: Vec<f32>,
-    /// Block by block the sums of its points' coordinates, and their number.
+    /// Block by block the sums of its points' coordinates, and their number; none where nothing is made from them.
     pub sums: Vec<[f32; 4]>,
 }
 
@@ -43,9 +43,9 @@ impl Cloud {
                 *of_to = depth(*to);
             }
         }
-        let across = Blocks::of(self.width, self.height).across;
-        for at in 0..self.sums.len() {
-            self.sums[at] = self.sum_of_block((at % across, at / across));
+        let blocks = Blocks::of(self.width, self.height);
+        for block in 0..self.sums.len() {
+            self.sums[block] = self.sum_of_block(blocks.place(block));
         }
         Ok(())
     }
@@ -73,7 +73,8 @@ impl Cloud {
         resize(&mut self.points, self.width * self.height + BLOCK - 1, [f32::NAN; 3])?;
         resize(&mut self.depths, self.width * self.height, f32::NAN)?;
         let blocks = Blocks::of(self.width, self.height).count();
-        resize(&mut self.sums, blocks, [0.0; 4])
+        let summed = if options.has_block_gradients() { blocks } else { 0 };
+        resize(&mut self.sums, summed, [0.0; 4])
     }
 
     /// Bytes held.

@@ -32,12 +32,13 @@ impl SummedNormals {
         })
     }
 
-    /// Sums those across the mean 3-D gradients of a cloud in windows of these radii around the blocks; 0 for none.
+    /// Sums those across the mean 3-D gradients of a cloud, the blocks of which are summed, in windows of these radii around
+    /// them; 0 for none.
     pub fn sum_gradients(
         &mut self,
         cloud: &Cloud,
         blocks: &Blocks,
-        radius: impl Fn(usize) -> u32 + Sync,
+        radius: impl Fn((usize, usize)) -> u32 + Sync,
         workers: &Workers,
     ) -> Result<(), Error> {
         let (across, down) = (blocks.across, blocks.down);
@@ -46,7 +47,7 @@ impl SummedNormals {
         })?;
         let points = &self.points;
         self.normals.sum_up(across, down, workers, |block| {
-            let halves = match radius(block.1 * across + block.0) {
+            let halves = match radius(block) {
                 0 => return [0.0; 4],
                 radius if radius <= MIDDLE as u32 => halves_of_block(cloud, blocks, block),
                 radius => halves_around(points, blocks, block, radius),
@@ -142,18 +143,21 @@ fn plus(a: Sum, b: Sum) -> Sum {
 mod tests {
     use super::*;
     use crate::cloud::Points;
-    use crate::options::Options;
+    use crate::options::{Method, Options, Semantics};
 
     /// A cloud whose depths are a function of the column, with some points missing.
     fn cloud(depth: impl Fn(f32) -> f32) -> Cloud {
         let (width, height) = (90, 61);
+        let method = Method::CovarianceMatrix;
+        let semantics = Semantics::Paper;
+        let options = Options { semantics, method, crease_windows: true, ..Options::default() };
         let point = |at: usize| {
             let [x, y] = [at % width, at / width].map(|line| 0.01 * line as f32);
             if at % 11 == 3 { [f32::NAN; 3] } else { [x, y, depth(x)] }
         };
         let points: Vec<_> = (0..width * height).flat_map(point).collect();
         let points = Points::interleaved(&points, width, height, 3, 0).unwrap();
-        Cloud::new(&points, &Options::default()).unwrap()
+        Cloud::new(&points, &options).unwrap()
     }
 
     #[test]

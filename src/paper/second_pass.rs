@@ -130,12 +130,10 @@ impl SecondPass {
         let asked = Asked { blocks, wanted, clean, limit, least_noise };
         if options.crease_windows {
             let radius = |block| sample_radius(&windows.sizes, cloud, &blocks, block, options);
-            // Mean 3-D gradients vary as much as CM's normals do, and need none of its sums; the other methods' own normals
-            // tell more.
-            if options.is_cm_of_paper() {
+            if options.has_block_gradients() {
                 normals.sum_gradients(cloud, &blocks, radius, engine.workers())?;
             } else {
-                refill(radii, (0..blocks.count()).map(radius))?;
+                refill(radii, (0..blocks.count()).map(|block| radius(blocks.place(block))))?;
                 engine.of_blocks(&blocks, radii, &mut windows.of_even)?;
                 normals.sum(&windows.of_even, &blocks, engine.workers())?;
             }
@@ -341,10 +339,10 @@ fn sample_radius(
     sizes: &[f32],
     cloud: &Cloud,
     blocks: &Blocks,
-    block: usize,
+    block: (usize, usize),
     options: &Options,
 ) -> u32 {
-    let pixels = blocks.pixels((block % blocks.across, block / blocks.across));
+    let pixels = blocks.pixels(block);
     let middle = pixels[MIDDLE * BLOCK + MIDDLE];
     if cloud.is_missing(middle) {
         return 0;

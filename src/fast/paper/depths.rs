@@ -52,7 +52,7 @@ pub(crate) unsafe fn read<S: Along>(
 /// Rows of points, `BLOCK` or those that are left, where they are read from and to.
 pub(crate) struct PointRows<'a> {
     pub rows: &'a mut dyn Iterator<Item = (PointRow<'a>, &'a mut [[f32; 3]], &'a mut [f32])>,
-    /// As [`Cloud::sums`](crate::paper::Cloud::sums).
+    /// As [`Cloud::sums`](crate::paper::Cloud::sums), or none.
     pub sums: &'a mut [[f32; 4]],
     /// Room for sums down the columns, as [`room_for_columns`] says.
     pub columns: &'a mut [f32],
@@ -64,7 +64,8 @@ pub(crate) fn room_for_columns(across: usize) -> usize {
 }
 
 impl PointRows<'_> {
-    /// Reads points and their depths, distances from the origin where `range` says so, and sums the blocks.
+    /// Reads points and their depths, distances from the origin where `range` says so, and sums the blocks if that is asked
+    /// for.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
@@ -75,7 +76,7 @@ impl PointRows<'_> {
         let plane = columns.len() / 4;
         columns.fill(0.0);
         for (row, to, depths) in rows {
-            // SAFETY: as the caller's; there is room for a plane of as many columns as the blocks have.
+            // SAFETY: as the caller's.
             unsafe { read_points::<S>(&row, options, range, to, depths, columns) };
         }
         let columns = columns.as_ptr();
@@ -97,10 +98,10 @@ impl PointRows<'_> {
     }
 }
 
-/// Reads a row of points and their depths, and adds them to the sums of four fields' columns.
+/// Reads a row of points and their depths, and adds them to the sums of four fields' columns, if there are some.
 ///
 /// # Safety
-/// The processor has the instruction set of `S`; there is room for whole groups of columns.
+/// The processor has the instruction set of `S`.
 #[inline(always)]
 unsafe fn read_points<S: Along>(
     row: &PointRow,
@@ -113,7 +114,8 @@ unsafe fn read_points<S: Along>(
     let width = to.len();
     let depths = &mut depths[..width];
     let plane = columns.len() / 4;
-    assert!(width.next_multiple_of(S::LANES) <= plane);
+    let are_summed = plane > 0;
+    assert!(!are_summed || width.next_multiple_of(S::LANES) <= plane);
     let columns = columns.as_mut_ptr();
     for x in (0..width).step_by(S::LANES) {
         // SAFETY: as the caller's; all of the lanes, or as many as there is room for, are stored.
@@ -122,10 +124,12 @@ unsafe fn read_points<S: Along>(
             let (none, there) = (S::splat(f32::NAN), there::<S>(point, options));
             let depth = S::select(there, depth::<S>(point, range), none);
             let mut fields = [depth; 4];
-            let [px, py, pz] = point;
-            for (field, value) in [px, py, pz, S::splat(1.0)].into_iter().enumerate() {
-                let sum = columns.add(field * plane + x);
-                S::store(sum, S::add(S::load(sum), S::and(there, value)));
+            if are_summed {
+                let [px, py, pz] = point;
+                for (field, value) in [px, py, pz, S::splat(1.0)].into_iter().enumerate() {
+                    let sum = columns.add(field * plane + x);
+                    S::store(sum, S::add(S::load(sum), S::and(there, value)));
+                }
             }
             for c in 0..3 {
                 fields[c] = S::select(there, point[c], none);

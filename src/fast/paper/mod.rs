@@ -14,6 +14,7 @@ mod rects;
 mod tile;
 mod windows;
 
+use std::iter::repeat_with;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -148,18 +149,17 @@ pub(crate) fn compute_own(
     job.tiles(scratch, indices, normals, largest, 1)
 }
 
-/// Writes the normals of the pixels that take even windows; and, if they have not been written yet, those of pixels that
-/// could but take none.
+/// Writes the normals of the pixels that take even windows; and, if their points are given, those of pixels that could but
+/// take none.
 pub(crate) fn write_chosen(
     job: &Job,
     second_pass: &SecondPass,
     cloud: &Cloud,
     normals: &Normals,
-    are_left: bool,
+    of_left: Option<&Points>,
     workers: &Workers,
 ) {
-    let &Job { points, options, .. } = job;
-    let of_left = are_left.then_some(points);
+    let options = job.options;
     workers.for_each(cloud.height, |_, y| {
         let row = ChosenRow { cloud, options, second_pass, normals, y, of_left };
         // SAFETY: the processor has the instruction set, and every row falls to one thread.
@@ -195,7 +195,8 @@ pub(crate) fn read_cloud(
     }
     let rows = cloud.points.chunks_mut(BLOCK * width);
     let rows = rows.zip(cloud.depths.chunks_mut(BLOCK * width));
-    let rows = rows.zip(cloud.sums.chunks_mut(across)).enumerate();
+    let sums = cloud.sums.chunks_mut(across).chain(repeat_with(Default::default));
+    let rows = rows.zip(sums).enumerate();
     workers.share(rows, |worker, rows| {
         let columns = &mut lock(&each[worker]).paper.columns;
         for (row, ((to, depths), sums)) in rows {
@@ -767,6 +768,7 @@ impl Task for ChoicesTask<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::options::Semantics;
 
     #[test]
     fn clouds_are_read_as_in_the_plain_form() {
@@ -778,14 +780,18 @@ mod tests {
                 };
                 let values: Vec<_> = (0..4 * width * height).map(value).collect();
                 let points = Points::interleaved(&values, width, height, 4, 0).unwrap();
-                let options = Options::default();
+                let mut options = Options::default();
                 let mut scratch = super::super::Scratch::default();
                 scratch.prepare(1).unwrap();
-                for whole_points in [false, true] {
+                for (whole_points, summed) in [(false, true), (true, false), (true, true)] {
+                    options.semantics = Semantics::Paper;
+                    options.method = Method::CovarianceMatrix;
+                    options.crease_windows = summed;
                     let job = Job { isa, points: &points, options: &options, whole_points };
                     let mut found = Cloud::default();
                     read_cloud(&job, &mut found, &mut scratch).unwrap();
                     let expected = Cloud::new(&points, &options).unwrap();
+                    assert_eq!(expected.sums.is_empty(), !summed);
                     let bits = |cloud: &Cloud| {
                         let Cloud { points, depths, sums, .. } = cloud;
                         let all = [points.as_flattened(), depths, sums.as_flattened()].concat();
