@@ -548,16 +548,15 @@ pub(crate) fn prefetch(at: *const f32, bytes: usize) {
     let _ = (at, bytes);
 }
 
-/// Asks for the cache lines that will be written a few groups later: normals are so far apart that stores would wait
-/// for their lines one by one.
+/// Asks for the cache lines of so many pixels, which will be written: normals are so far apart that stores would wait for
+/// their lines one by one.
 #[inline(always)]
 fn prefetch_for_writing(at: *mut f32, lanes: usize, point_stride: usize) {
     #[cfg(target_arch = "x86_64")]
     for lane in (0..lanes).step_by(2) {
         use std::arch::x86_64::{_MM_HINT_ET0, _mm_prefetch};
-        let ahead = at.wrapping_byte_add((PIXELS_AHEAD + lane) * point_stride);
         // SAFETY: a prefetch reads and writes nothing, whatever the address.
-        unsafe { _mm_prefetch::<_MM_HINT_ET0>(ahead.cast()) };
+        unsafe { _mm_prefetch::<_MM_HINT_ET0>(at.wrapping_byte_add(lane * point_stride).cast()) };
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = (at, lanes, point_stride);
@@ -565,19 +564,28 @@ fn prefetch_for_writing(at: *mut f32, lanes: usize, point_stride: usize) {
 
 /// How far ahead lines are asked for; found by trying 48 to 512 on 640x480, where more gains, and 1280x960, where it does
 /// not, with caches that hold nothing of the frame.
-#[cfg(target_arch = "x86_64")]
 const PIXELS_AHEAD: usize = 128;
 
 impl Normals<'_> {
-    /// Writes as many pixels of a row as there are lanes: nx, ny, nz and the curvature.
+    /// Writes as many pixels of a row as there are lanes: nx, ny, nz and the curvature. Asks for those that are written a few
+    /// groups later, if it is these columns of one row after the other.
     ///
     /// # Safety
     /// As [`Normals::write`], for the pixels from `x` on; the processor has the instruction set of `S`.
     #[inline(always)]
-    pub(crate) unsafe fn write_lanes<S: Simd>(&self, x: usize, y: usize, fields: [S::F; 4]) {
-        let (first, step) = (self.grid.offset(x, y), self.grid.point_stride);
-        let nx = self.normal[0].wrapping_byte_add(first);
-        prefetch_for_writing(nx, S::LANES, step);
+    pub(crate) unsafe fn write_lanes<S: Simd>(
+        &self,
+        x: usize,
+        y: usize,
+        fields: [S::F; 4],
+        columns: &Range<usize>,
+    ) {
+        let step = self.grid.point_stride;
+        let at = |x: usize, y: usize| self.normal[0].wrapping_byte_add(self.grid.offset(x, y));
+        let (nx, ahead) = (at(x, y), x + PIXELS_AHEAD);
+        let is_in_row = ahead < columns.end;
+        let ahead = if is_in_row { at(ahead, y) } else { at(ahead - columns.len(), y + 1) };
+        prefetch_for_writing(ahead, S::LANES, step);
         // SAFETY: as the caller's.
         unsafe {
             if let Some(place) = self.side_by_side {

@@ -1,11 +1,85 @@
-//! What the two gradient methods have in common: coordinates as integers, and normals from two gradients.
+//! What the two gradient methods have in common: coordinates as integers, both gradients side by side, and normals from
+//! them.
 //!
 //! The integers are multiples of a power of two: their sums are exact whatever wraps around between, as long as the
 //! differences fit, and the limit on the coordinates sees to that.
 
 use super::arithmetic::{Floats, cross, dot};
+use super::lanes::LANES;
+use super::run::{Noted, RUN};
 use super::tile::Found;
-use crate::simd::Simd;
+use crate::simd::{GROUP, Simd};
+
+/// x, y and z and nothing of something horizontal; and of something vertical. All of a pixel's are read at once, whatever
+/// the windows of its neighbours.
+pub(crate) type Both<T> = [T; GROUP];
+
+/// Bytes from a pixel to the next.
+pub(crate) const PIXEL: usize = size_of::<Both<i32>>();
+
+/// Where the second of both begins, and the lanes of the first.
+pub(crate) const VERTICAL: usize = 4;
+pub(crate) const HORIZONTAL: u32 = (1 << VERTICAL) - 1;
+
+/// What lies between left corners above and below, in bytes, and so many columns to the right: of one window or, in more
+/// lanes than a group has, of several side by side. `pixel` is that of the first, in row 0 of the ring.
+///
+/// # Safety
+/// The processor has the instruction set of `S`; the ring holds the corners.
+#[inline(always)]
+pub(crate) unsafe fn between<S: Simd>(
+    pixel: *const Both<i32>,
+    [above, below]: [usize; 2],
+    columns: usize,
+) -> S::I {
+    // SAFETY: as the caller's.
+    unsafe {
+        let at = |corner: usize| S::load_i(pixel.wrapping_byte_add(corner).cast());
+        let difference = |left: usize| S::sub_i(at(left.wrapping_add(PIXEL * columns)), at(left));
+        S::sub_i(difference(below), difference(above))
+    }
+}
+
+/// The gradients of a run's pixels.
+#[repr(C, align(64))]
+pub(crate) struct Gradients([Both<f32>; RUN]);
+
+impl Default for Gradients {
+    fn default() -> Self {
+        Gradients([[0.0; GROUP]; RUN])
+    }
+}
+
+impl Noted for Gradients {}
+
+impl Gradients {
+    /// Where those of the pixels from `at` on, as many as there are lanes, are noted.
+    #[inline(always)]
+    pub fn from(&mut self, at: usize) -> *mut f32 {
+        self.0[at..at + LANES].as_mut_ptr().cast()
+    }
+
+    pub fn put(&mut self, at: usize, both: Both<f32>) {
+        self.0[at] = both;
+    }
+
+    /// The normals of the pixels from `at` on, with windows of these sides.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn normals<S: Simd>(&self, scale: &Scale, at: usize, sides: S::F) -> Found<S> {
+        let from = self.0[at..at + S::LANES].as_ptr().cast::<f32>();
+        // SAFETY: as the caller's; so many pixels' gradients are there.
+        unsafe {
+            let gradients = |first: usize| {
+                let [x, y, z] = S::load_points(from.add(first), PIXEL);
+                [Floats(x), Floats(y), Floats(z)]
+            };
+            scale.normals(gradients(0), gradients(VERTICAL), sides)
+        }
+    }
+}
 
 /// How coordinates become integers.
 #[derive(Debug, Default)]

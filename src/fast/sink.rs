@@ -1,5 +1,7 @@
 //! Where a tile's normals go: to every pixel, or to the places of the pixels that indices list.
 
+use std::ops::Range;
+
 use super::lanes::LANES;
 use super::tile::{Bits, Estimates, all};
 use crate::Error;
@@ -48,12 +50,18 @@ impl<'a> Sink<'a> {
         }
     }
 
-    /// Writes these `lanes` of some estimates, for the pixels from `(x, y)` on.
+    /// Writes these `lanes` of some estimates, for the pixels from `(x, y)` on. Row by row, `columns` are written.
     ///
     /// # Safety
     /// The pixels are inside the image, and no other thread writes them; the processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn write<S: Simd>(&self, x: usize, y: usize, lanes: u32, estimates: &Estimates) {
+    pub unsafe fn write<S: Simd>(
+        &self,
+        (x, y): (usize, usize),
+        lanes: u32,
+        estimates: &Estimates,
+        columns: &Range<usize>,
+    ) {
         const { assert!(S::LANES == LANES) };
         let Estimates { normal: [nx, ny, nz], curvature } = estimates;
         let normal = |lane: usize| [nx[lane], ny[lane], nz[lane]];
@@ -63,7 +71,7 @@ impl<'a> Sink<'a> {
                 if lanes == all(LANES) {
                     let (nx, ny) = (S::load(nx.as_ptr()), S::load(ny.as_ptr()));
                     let (nz, curvature) = (S::load(nz.as_ptr()), S::load(curvature.as_ptr()));
-                    normals.write_lanes::<S>(x, y, [nx, ny, nz, curvature]);
+                    normals.write_lanes::<S>(x, y, [nx, ny, nz, curvature], columns);
                 } else {
                     for lane in Bits(lanes) {
                         normals.write(x + lane, y, normal(lane), curvature[lane]);
@@ -81,15 +89,5 @@ impl<'a> Sink<'a> {
                 }
             }
         }
-    }
-
-    /// Writes NaN to `count` pixels from `(x, y)` on.
-    ///
-    /// # Safety
-    /// As [`Sink::write`].
-    #[inline(always)]
-    pub unsafe fn write_none<S: Simd>(&self, x: usize, y: usize, count: usize) {
-        // SAFETY: as the caller's.
-        unsafe { self.write::<S>(x, y, all(count), &Estimates::NONE) };
     }
 }

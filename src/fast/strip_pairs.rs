@@ -5,31 +5,20 @@
 //! held side by side, each counted from where both have the same corners: a pixel's gradients are four reads,
 //! whatever the windows of its neighbours.
 
-use super::arithmetic::Floats;
 use super::buffer::Buffer;
-use super::gradients::Scale;
+use super::gradients::{Both, Gradients, PIXEL, Scale, VERTICAL, between};
 use super::lanes::LANES;
 use super::planes::{Frame, MARGIN, Planes};
-use super::run::{Noted, RUN};
 use super::tile::{Bits, Found, Pair, Sums, Tile};
 use crate::Error;
 use crate::memory::{bytes, make_room};
 use crate::simd::{Along, GROUP, Groups, Simd};
 use crate::window::Image;
 
-/// Of a pixel (x, y), or between the corners of a window: x, y and z and nothing of the sum of columns x - 1 and x
-/// down to row y; and of the sum of rows y and y + 1 up to column x - 1.
-type Both<T> = [T; GROUP];
-
-/// Bytes from a pixel to the next.
-const PIXEL: usize = size_of::<Both<i32>>();
-
-/// Where the second of both begins.
-const VERTICAL: usize = 4;
-
 /// The ring of prefix sums.
 #[derive(Debug, Default)]
 pub(crate) struct StripPairs {
+    /// Of a pixel (x, y): the sum of columns x - 1 and x down to row y; and that of rows y and y + 1 up to column x - 1.
     ring: Buffer<Both<i32>>,
     /// Three planes of one row: the sums down to the row pushed last, that row, and the one before it.
     columns: Buffer<i32>,
@@ -40,18 +29,6 @@ pub(crate) struct StripPairs {
     /// window of no side is of no sum.
     places: Vec<[usize; 2]>,
 }
-
-/// Horizontal and vertical gradients of a run's pixels.
-#[repr(C, align(64))]
-pub(crate) struct Gradients([Both<f32>; RUN]);
-
-impl Default for Gradients {
-    fn default() -> Self {
-        Gradients([[0.0; GROUP]; RUN])
-    }
-}
-
-impl Noted for Gradients {}
 
 impl StripPairs {
     /// Adds row `y` of the planes, which completes the sums of the row above.
@@ -111,13 +88,14 @@ impl StripPairs {
         run: &mut Gradients,
         at: usize,
     ) {
-        let to = run.0[at..at + LANES].as_mut_ptr().cast::<f32>();
+        let to = run.from(at);
         let pixels = self.ring.as_ptr().wrapping_add(frame.column(pair.x));
-        // SAFETY: as the caller's.
+        // SAFETY: as the caller's: no window of the row aimed at is larger, and rows and columns are held.
         unsafe {
             if let Some(side) = pair.one_side::<S::Pair>(0, lanes) {
+                let left = *self.places.get_unchecked(side);
                 for lane in (0..LANES).step_by(S::Widest::LANES / GROUP) {
-                    let both = self.between::<S::Widest>(pixels.wrapping_add(lane), side);
+                    let both = between::<S::Widest>(pixels.wrapping_add(lane), left, side);
                     S::Widest::store(to.add(GROUP * lane), S::Widest::float_i(both));
                 }
                 return;
@@ -125,26 +103,12 @@ impl StripPairs {
             for first in (0..LANES).step_by(GROUP) {
                 let sides = pair.sides::<S>(first, lanes >> first);
                 for (lane, side) in (first..).zip(sides) {
-                    let both = self.between::<S>(pixels.wrapping_add(lane), side as usize);
+                    let side = side as usize;
+                    let left = *self.places.get_unchecked(side);
+                    let both = between::<S>(pixels.wrapping_add(lane), left, side);
                     S::store(to.add(GROUP * lane), S::float_i(both));
                 }
             }
-        }
-    }
-
-    /// The gradients of one window or, in more lanes than a group has, of several side by side: of their pixel in row
-    /// 0 of the ring, the first is at `pixel`.
-    ///
-    /// # Safety
-    /// As [`Sums::note`].
-    #[inline(always)]
-    unsafe fn between<S: Simd>(&self, pixel: *const Both<i32>, side: usize) -> S::I {
-        // SAFETY: as the caller's: no window of the row aimed at is larger, and rows and columns are held.
-        unsafe {
-            let [above, below] = *self.places.get_unchecked(side);
-            let at = |corner: usize| S::load_i(pixel.wrapping_byte_add(corner).cast());
-            let difference = |left: usize| S::sub_i(at(left.wrapping_add(PIXEL * side)), at(left));
-            S::sub_i(difference(below), difference(above))
         }
     }
 
@@ -164,7 +128,7 @@ impl StripPairs {
         for lane in Bits(lanes) {
             let (pixel, side) = pair.window(lane);
             if tile.has_only_finite(pixel, side) {
-                run.0[at + lane] = self.of_mirrored(frame, tile.image, pixel, side);
+                run.put(at + lane, self.of_mirrored(frame, tile.image, pixel, side));
             } else {
                 plain |= 1 << lane;
             }
@@ -272,14 +236,7 @@ impl Sums for StripPairs {
         sides: S::F,
         _fresh: bool,
     ) -> Found<S> {
-        let from = run.0[at..at + S::LANES].as_ptr().cast::<f32>();
-        // SAFETY: as the caller's; so many pixels' gradients are there.
-        unsafe {
-            let gradients = |first: usize| {
-                let [x, y, z] = S::load_points(from.add(first), size_of::<Both<f32>>());
-                [Floats(x), Floats(y), Floats(z)]
-            };
-            self.scale.normals(gradients(0), gradients(VERTICAL), sides)
-        }
+        // SAFETY: as the caller's.
+        unsafe { run.normals(&self.scale, at, sides) }
     }
 }

@@ -1,105 +1,128 @@
 //! Sums of strips, for SIMPLE_3D_GRADIENT.
 //!
 //! Its gradients are the differences between a window's outermost columns and between its outermost rows: two prefix
-//! sums, down the columns and along the rows, give both.
+//! sums, down the columns and along the rows, give both. They are held side by side, as for AVERAGE_3D_GRADIENT, each
+//! counted from where both have the same corners if the window's side is even.
 
-use std::convert::Infallible;
-
-use super::arithmetic::Integers;
 use super::buffer::Buffer;
-use super::by_side::{self, BySide};
-use super::gradients::Scale;
-use super::planes::{Corners, Frame, MARGIN, Planes, sum_between};
-use super::run::OfRun;
+use super::gradients::{Both, Gradients, HORIZONTAL, PIXEL, Scale, VERTICAL, between};
+use super::lanes::LANES;
+use super::planes::{Frame, MARGIN, Planes};
 use super::tile::{Found, Pair, Sums, Tile};
 use crate::Error;
 use crate::memory::{bytes, make_room};
-use crate::simd::{Along, Groups, Simd};
-use crate::window::Image;
+use crate::simd::{Along, GROUP, Groups, Simd};
 
-/// The rings of prefix sums.
+/// The ring of prefix sums.
 #[derive(Debug, Default)]
 pub(crate) struct Strips {
-    /// Per row, 3 planes each: sums down the columns, and along the rows.
+    /// Of a pixel (x, y): the sum of column x down to row y, and that of row y + 1 up to column x - 1.
+    ring: Buffer<Both<i32>>,
+    /// Three planes of one row: the sums of columns down to the row pushed last.
     columns: Buffer<i32>,
-    rows: Buffer<i32>,
     scale: Scale,
-    /// The place of the row pushed last; before the first the one after the ring, which is zero.
-    pushed: usize,
-    /// By the side of a window: its places.
-    places: Vec<Places>,
+    /// By the side of a window, in bytes, which addresses are made of at once: its left corners above, the same for both
+    /// gradients, and below, for the horizontal and for the vertical one.
+    places: Vec<[usize; 3]>,
 }
 
-/// In the ring of columns and in that of rows.
-type Places = [Corners; 2];
-
-/// Horizontal and vertical gradient.
-type Gradients<T> = [[T; 3]; 2];
-
 impl Strips {
-    /// Adds row `y` of the planes.
+    /// Adds row `y` of the planes, which completes the sums of the row above.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn push_row<S: Along>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
         let steps = frame.steps::<S>();
-        for c in 0..3 {
-            let start = c * frame.stride;
-            let own = frame.start(3, y) + start;
-            let above = frame.start_of(3, self.pushed) + start;
-            let from = planes.row(frame, c, y).as_ptr();
-            let rows = &mut self.rows[own..own + frame.stride];
-            assert!(
-                MARGIN + steps * S::LANES <= frame.stride
-                    && own.max(above) + frame.stride <= self.columns.len()
-            );
-            // SAFETY: as the caller's; all lanes lie inside the rows, whose lengths were just checked.
-            unsafe {
-                let columns = self.columns.as_mut_ptr();
-                let mut carry = S::splat_i(0);
-                for step in 0..steps {
-                    let at = MARGIN + step * S::LANES;
-                    let point = self.scale.integers::<S>(c, S::load(from.add(at)));
-                    let sum = S::running_sum_i(point, &mut carry);
-                    S::store_i(rows.as_mut_ptr().add(at), sum);
-                    let column = S::add_i(point, S::load_i(columns.add(above + at)));
-                    S::store_i(columns.add(own + at), column);
+        assert!(MARGIN + steps * S::LANES <= frame.stride);
+        let columns = self.columns[..3 * frame.stride].as_mut_ptr();
+        let points = planes.rows(frame, y).map(<[f32]>::as_ptr);
+        let done = frame.start(1, y.wrapping_sub(1));
+        let ring = self.ring[done..done + frame.stride].as_mut_ptr().cast::<i32>();
+        // SAFETY: as the caller's; all lanes lie inside the rows, whose lengths were just checked.
+        unsafe {
+            let zero = S::splat_i(0);
+            let mut carries = [zero; 3];
+            for step in 0..steps {
+                let step = MARGIN + step * S::LANES;
+                let mut both = [zero; GROUP];
+                for c in 0..3 {
+                    let at = c * frame.stride + step;
+                    let point = self.scale.integers::<S>(c, S::load(points[c].add(step)));
+                    let along = S::running_sum_i(point, &mut carries[c]);
+                    both[VERTICAL + c] = S::sub_i(along, point);
+                    both[c] = S::load_i(columns.add(at));
+                    S::store_i(columns.add(at), S::add_i(both[c], point));
+                }
+                S::store_by_lanes(both, ring.add(GROUP * step));
+            }
+        }
+    }
+
+    /// Notes the windows of a pair's `lanes`, which are inside the image; the others' gradients mean nothing.
+    ///
+    /// # Safety
+    /// As [`Sums::note`].
+    #[inline(always)]
+    unsafe fn note_inside<S: Groups>(
+        &self,
+        frame: &Frame,
+        pair: &Pair,
+        lanes: u32,
+        run: &mut Gradients,
+        at: usize,
+    ) {
+        let to = run.from(at);
+        let pixels = self.ring.as_ptr().wrapping_add(frame.column(pair.x));
+        // SAFETY: as the caller's: no window of the row aimed at is larger, and rows and columns are held.
+        unsafe {
+            let one_side = pair.one_side::<S::Pair>(0, lanes);
+            if let Some(side) = one_side.filter(|side| side % 2 == 0) {
+                let [above, both, _] = *self.places.get_unchecked(side);
+                for lane in (0..LANES).step_by(S::Widest::LANES / GROUP) {
+                    let pixel = pixels.wrapping_add(lane);
+                    let both = between::<S::Widest>(pixel, [above, both], side);
+                    S::Widest::store(to.add(GROUP * lane), S::Widest::float_i(both));
+                }
+                return;
+            }
+            for first in (0..LANES).step_by(GROUP) {
+                let sides = pair.sides::<S>(first, lanes >> first);
+                for (lane, side) in (first..).zip(sides) {
+                    let (pixel, side) = (pixels.wrapping_add(lane), side as usize);
+                    let [above, horizontal, vertical] = *self.places.get_unchecked(side);
+                    let mut both = between::<S>(pixel, [above, horizontal], side & !1);
+                    if side % 2 != 0 {
+                        let vertical = between::<S>(pixel, [above, vertical], side);
+                        both = S::select_i(HORIZONTAL, both, vertical);
+                    }
+                    S::store(to.add(GROUP * lane), S::float_i(both));
                 }
             }
         }
-        self.pushed = frame.place(y);
-    }
-
-    /// The difference between two columns over the window's rows, and between two rows over its columns: the prefix
-    /// sums end before the window and with it.
-    fn places(frame: &Frame, y: usize, side: usize) -> Places {
-        let (half, side) = ((side / 2) as isize, side as isize);
-        let (strips, sums) = ([-half, half], [-half - 1, side - half - 1]);
-        [frame.corners(3, y, sums, strips), frame.corners(3, y, strips, sums)]
     }
 }
 
 impl Sums for Strips {
-    type OfRun = OfRun<i32, 6>;
+    type OfRun = Gradients;
 
-    const COLUMN: usize = 6 * size_of::<i32>();
+    const COLUMN: usize = PIXEL;
     const CURVATURE: bool = false;
     const LIMITED: bool = true;
 
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {
-        frame.reserve_ring(3, &mut self.columns)?;
-        self.rows.grow(frame.start_of(3, frame.ring))?;
+        self.ring.grow(frame.start_of(1, frame.ring))?;
+        self.columns.grow(3 * frame.stride)?;
         make_room(&mut self.places, side + 1)
     }
 
-    fn start(&mut self, frame: &Frame, limit: f32, side: usize, origin: [f32; 3]) {
-        self.pushed = frame.start_ring(3, &mut self.columns);
+    fn start(&mut self, _frame: &Frame, limit: f32, side: usize, origin: [f32; 3]) {
+        self.columns.fill(0);
         self.scale = Scale::new(2, limit, side, origin);
     }
 
     fn size(&self) -> usize {
-        self.columns.size() + self.rows.size() + bytes(&self.places)
+        self.ring.size() + self.columns.size() + bytes(&self.places)
     }
 
     #[inline(always)]
@@ -109,8 +132,17 @@ impl Sums for Strips {
     }
 
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
+        let place = |row: isize, column: isize| {
+            let pixel = frame.start(1, y.wrapping_add_signed(row)).wrapping_add_signed(column);
+            pixel.wrapping_mul(PIXEL)
+        };
+        // Columns end before the window and with it; rows are kept one row higher.
+        let places = |side: usize| {
+            let half = (side / 2) as isize;
+            [-half - 1, side as isize - half - 1, half - 1].map(|row| place(row, -half))
+        };
         self.places.clear();
-        self.places.extend((0..=side).map(|side| Self::places(frame, y, side)));
+        self.places.extend((0..=side).map(places));
     }
 
     #[inline(always)]
@@ -118,108 +150,28 @@ impl Sums for Strips {
         &self,
         tile: &Tile,
         frame: &Frame,
-        planes: &Planes,
+        _planes: &Planes,
         pair: &Pair,
-        run: &mut Self::OfRun,
+        run: &mut Gradients,
         at: usize,
     ) -> u32 {
-        // SAFETY: as the caller's.
-        unsafe { by_side::note::<S, Self>(self, tile, frame, planes, pair, run, at) }
+        let inside = tile.inside(pair);
+        if inside != 0 {
+            // SAFETY: as the caller's.
+            unsafe { self.note_inside::<S>(frame, pair, inside, run, at) };
+        }
+        pair.windows & !inside // the method has no mirrored windows
     }
 
     #[inline(always)]
     unsafe fn estimate<S: Simd>(
         &self,
-        run: &OfRun<i32, 6>,
+        run: &Gradients,
         at: usize,
         sides: S::F,
         _fresh: bool,
     ) -> Found<S> {
         // SAFETY: as the caller's.
-        unsafe {
-            let [hx, hy, hz, vx, vy, vz] = run.load::<S>(at);
-            let h = [hx.float(), hy.float(), hz.float()];
-            let v = [vx.float(), vy.float(), vz.float()];
-            self.scale.normals(h, v, sides)
-        }
-    }
-}
-
-impl BySide for Strips {
-    type OfLanes<S: Simd> = Gradients<Integers<S>>;
-    type Of1 = Infallible;
-
-    const EVEN: bool = false;
-
-    #[inline(always)]
-    unsafe fn of_pixels<S: Simd>(
-        &self,
-        frame: &Frame,
-        _planes: &Planes,
-        x: usize,
-        side: usize,
-    ) -> Self::OfLanes<S> {
-        let [columns, rows] = &self.places[side];
-        let x = frame.column(x);
-        // SAFETY: as the caller's: rows and columns are held, and so are the groups from these columns on.
-        unsafe {
-            let mut sums = Self::none::<S>();
-            for c in 0..3 {
-                let x = x + c * frame.stride;
-                sums[0][c] = sum_between(self.columns.as_ptr().add(x), columns);
-                sums[1][c] = sum_between(self.rows.as_ptr().add(x), rows);
-            }
-            sums
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn select<S: Simd>(
-        lanes: u32,
-        yes: Self::OfLanes<S>,
-        no: Self::OfLanes<S>,
-    ) -> Self::OfLanes<S> {
-        let mut sums = no;
-        for g in 0..2 {
-            for c in 0..3 {
-                // SAFETY: as the caller's.
-                let lane = unsafe { S::select_i(lanes, yes[g][c].0, no[g][c].0) };
-                sums[g][c] = Integers(lane);
-            }
-        }
-        sums
-    }
-
-    #[inline(always)]
-    unsafe fn none<S: Simd>() -> Self::OfLanes<S> {
-        // SAFETY: as the caller's.
-        [[Integers(unsafe { S::splat_i(0) }); 3]; 2]
-    }
-
-    fn of_mirrored(
-        &self,
-        _frame: &Frame,
-        _planes: &Planes,
-        _image: &Image,
-        _pixel: (usize, usize),
-        _side: usize,
-    ) -> Option<Infallible> {
-        None // the method has no mirrored windows
-    }
-
-    #[inline(always)]
-    unsafe fn put<S: Simd>(_sums: &mut Self::OfLanes<S>, _lane: usize, one: Infallible) {
-        match one {}
-    }
-
-    #[inline(always)]
-    unsafe fn note_lanes<S: Simd>(
-        sums: Gradients<Integers<S>>,
-        run: &mut OfRun<i32, 6>,
-        at: usize,
-    ) {
-        let [[a, b, c], [d, e, f]] = sums;
-        // SAFETY: as the caller's.
-        unsafe { run.store::<S>(at, [a, b, c, d, e, f]) }
+        unsafe { run.normals(&self.scale, at, sides) }
     }
 }

@@ -197,10 +197,27 @@ impl Tile<'_> {
     unsafe fn write_none<S: Groups>(&self, sink: &Sink) {
         for y in self.rows.clone() {
             for x in self.columns.clone().step_by(LANES) {
+                let written = all((self.columns.end - x).min(LANES));
                 // SAFETY: as the caller's.
-                unsafe { sink.write_none::<S::Pair>(x, y, (self.columns.end - x).min(LANES)) };
+                unsafe { self.write::<S>(sink, (x, y), written, &Estimates::NONE) };
             }
         }
+    }
+
+    /// Writes these `lanes` of the estimates of pixels from `(x, y)` on.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn write<S: Groups>(
+        &self,
+        sink: &Sink,
+        pixel: (usize, usize),
+        lanes: u32,
+        estimates: &Estimates,
+    ) {
+        // SAFETY: as the caller's.
+        unsafe { sink.write::<S::Pair>(pixel, lanes, estimates, &self.columns) };
     }
 
     /// The largest magnitude of a coordinate in the frame, counted from the origin.
@@ -352,7 +369,7 @@ impl Tile<'_> {
                     }
                     let windows = pair.windows;
                     if windows == 0 {
-                        sink.write::<S::Pair>(x, y, written, &Estimates::NONE);
+                        self.write::<S>(sink, (x, y), written, &Estimates::NONE);
                         continue;
                     }
                     let at = run.length * LANES;
@@ -428,7 +445,7 @@ impl Tile<'_> {
                 if plain != 0 {
                     self.plain_lanes(&mut estimates, row, (x, y), plain);
                 }
-                sink.write::<S::Pair>(x, y, written, &estimates);
+                self.write::<S>(sink, (x, y), written, &estimates);
             }
         }
     }

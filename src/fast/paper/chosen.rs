@@ -62,7 +62,7 @@ impl ChosenRow<'_> {
                     turned::<S>(normal, [Floats(px), Floats(py), Floats(pz)], options.viewpoint);
                 let fields = [nx.0, ny.0, nz.0, curvature];
                 if lanes.count_ones() as usize == S::LANES {
-                    normals.write_lanes::<S>(x, y, fields);
+                    normals.write_lanes::<S>(x, y, fields, &(0..cloud.width));
                     continue;
                 }
                 let mut found = [[0.0; LANES]; 4];

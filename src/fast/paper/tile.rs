@@ -253,6 +253,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
             Cleaned { points: self.points, zero_is_missing: self.options.zero_is_missing };
         let Run { start, radii, sums, points, lanes, left_out } = run;
         let end = self.columns.end.min(*start + RUN * step);
+        let columns = self.columns.start / step..self.columns.end.div_ceil(step);
         // SAFETY: as the caller's.
         unsafe {
             sums.solve::<S>(0, lanes);
@@ -260,8 +261,9 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 let (at, windows) = (pair * LANES, lanes[pair]);
                 let count = (end - x).div_ceil(step).min(LANES);
                 let written = if is_later { windows } else { all(count) & !left_out[pair] };
+                let place = (x / step, y / step);
                 if windows == 0 {
-                    sink.write::<S::Pair>(x / step, y / step, written, &Estimates::NONE);
+                    sink.write::<S::Pair>(place, written, &Estimates::NONE, &columns);
                     continue;
                 }
                 let pixel =
@@ -282,7 +284,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 for lane in Bits(plain) {
                     normals.put(lane, self.plain(&cleaned, pixel(lane), &rect(lane)));
                 }
-                sink.write::<S::Pair>(x / step, y / step, written, &normals);
+                sink.write::<S::Pair>(place, written, &normals, &columns);
             }
         }
     }
