@@ -13,7 +13,8 @@ use crate::methods::{Estimate, estimate, estimate_window, start};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
 use crate::paper::{
-    self, Asked, Blocks, Cloud, EvenWindows, PaperMaps, SecondPass, Windows, with_missing_as_nan,
+    self, Asked, Blocks, Cloud, DepthChanges, EvenWindows, PaperMaps, SecondPass, Windows,
+    with_missing_as_nan,
 };
 use crate::smoothing_area::window_side;
 use crate::threads::Workers;
@@ -450,6 +451,16 @@ impl paper::Engine for Engine<'_> {
                 refill(sizes, maps.smoothing_radii.iter().map(|radius| radius.trunc()))
             }
             (_, false) => fast::paper::radii(&job, sizes, scratch),
+        }
+    }
+
+    fn find_depth_changes(&self, changes: &mut DepthChanges, cloud: &Cloud) -> Result<(), Error> {
+        let Engine { job, scratch, is_plain, .. } = self;
+        let workers = scratch.workers();
+        if *is_plain {
+            paper::find_depth_changes(changes, cloud, job.options, workers)
+        } else {
+            fast::paper::find_depth_changes(job, changes, cloud, workers)
         }
     }
 

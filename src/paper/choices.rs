@@ -285,7 +285,7 @@ impl<'a> Candidates<'a> {
         let rect = Rect::around((x, y), 1, (cloud.width, cloud.height));
         let of_column = |x: usize| rect.y.clone().map(|y| inverse(x, y)).sum::<f32>();
         let mean = rect.x.clone().map(of_column).sum::<f32>() / NEXT;
-        let is_clean = !asked.clean.spoilt[cloud.index(x, y)];
+        let is_clean = !asked.clean.spoilt.has((x, y));
         let is_whole = rect.area() as f32 == NEXT && !mean.is_nan();
         if is_whole && is_clean && !self.is_exact {
             Near { inverse_depth: mean, points: NEXT }

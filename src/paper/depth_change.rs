@@ -13,6 +13,7 @@ use std::ops::Range;
 
 use super::blocks::Blocks;
 use super::cloud::Cloud;
+use super::marks::{Marks, around, mark, retain};
 use super::planes::{JITTER, Plane, inverse_depth};
 use super::rect::Rect;
 use crate::Error;
@@ -29,11 +30,11 @@ const NUMBERS: usize = 8;
 #[derive(Debug, Default)]
 pub(crate) struct DepthChanges {
     /// Between a pixel and its right neighbour.
-    right: Vec<bool>,
+    right: Marks,
     /// Between a pixel and its lower neighbour.
-    below: Vec<bool>,
+    below: Marks,
     /// The pixels that have a change among those next to them.
-    spoilt: Vec<bool>,
+    spoilt: Marks,
     /// Every pixel's steps along its column to the next one of these, with room beside the rows.
     steps: Vec<i16>,
     clean_radii: Vec<i16>,
@@ -43,7 +44,7 @@ pub(crate) struct DepthChanges {
 #[derive(Clone, Copy)]
 pub(crate) struct Clean<'a> {
     /// Pixel by pixel, whether there is a change among those next to it.
-    pub spoilt: &'a [bool],
+    pub spoilt: &'a Marks,
     /// Block by block the largest radius around the middle pixel of a window in which no two neighbours are a depth change
     /// apart; `LARGEST_CLEAN` where it is no less than what was asked for.
     pub radii: &'a [i16],
@@ -53,51 +54,53 @@ impl DepthChanges {
     /// Bytes held.
     pub fn size(&self) -> usize {
         let DepthChanges { right, below, spoilt, steps, clean_radii } = self;
-        [right, below, spoilt].map(bytes).iter().sum::<usize>() + bytes(steps) + bytes(clean_radii)
+        let marks = [right, below, spoilt].map(Marks::size).into_iter().sum::<usize>();
+        marks + bytes(steps) + bytes(clean_radii)
     }
 
     /// Becomes the changes of a cloud: `is_change(depth, difference, gap)` says whether a difference in depth to the
-    /// neighbour `gap` pixels to the right or below is one; no NaN is.
+    /// neighbour `gap` pixels to the right or below is one; `between` is [`between`], or does the same.
     pub fn find(
         &mut self,
         cloud: &Cloud,
         workers: &Workers,
-        is_change: impl Fn(f32, f32, usize) -> bool + Clone + Sync,
+        between: impl Fn([&[f32]; 2], [&mut [u64]; 2]) + Sync,
+        is_change: impl Fn(f32, f32, usize) -> bool + Sync,
     ) -> Result<(), Error> {
         let &Cloud { width, height, ref depths, .. } = cloud;
-        let DepthChanges { right, below, .. } = self;
-        refill(right, repeat_n(false, width * height))?;
-        refill(below, repeat_n(false, width * height))?;
-        let rows = right.chunks_mut(width).zip(below.chunks_mut(width)).enumerate();
-        workers.each(rows, |(y, (right, below))| {
+        // No pixel is known to be spoilt so far: there is room for what is behind gaps.
+        let DepthChanges { right, below, spoilt: behind_gaps, .. } = self;
+        for marks in [&mut *right, below, behind_gaps] {
+            marks.clear((width, height))?;
+        }
+        let rows = right.rows().zip(below.rows()).zip(behind_gaps.rows()).enumerate();
+        workers.each(rows, |(y, ((right, below), behind_gaps))| {
             let (row, next) = (y * width, (y + 1) * width);
-            // The row's own: what is found is not written to it, and loops are vectorized.
-            let is_change = is_change.clone();
             // To the pixels behind them in their row, axis 0, and in their columns.
             let behind = [row + 1..next, next..(next + width).min(depths.len())];
             for (axis, (changes, behind)) in [right, below].into_iter().zip(behind).enumerate() {
-                let pairs = depths[row..next].iter().zip(&depths[behind.clone()]);
-                for (to, (before, depth)) in changes.iter_mut().zip(pairs.clone()) {
-                    *to = before.is_nan() & !depth.is_nan();
-                }
-                for_each_mark(changes, |x, to| {
+                behind_gaps.fill(0);
+                let before = &depths[row..][..behind.len()];
+                between([before, &depths[behind.clone()]], [changes, behind_gaps]);
+                retain(behind_gaps, |x| {
                     let at = behind.start + x;
-                    *to = cloud.gap(at, axis).is_some_and(|gap| {
+                    let is_change = cloud.gap(at, axis).is_some_and(|gap| {
                         let before = depths[at - gap * [1, width][axis]];
                         is_change(before, depths[at] - before, gap)
                     });
+                    mark(changes, x, is_change.into());
+                    true
                 });
-                for (to, (before, depth)) in changes.iter_mut().zip(pairs) {
-                    *to |= is_change(*before, depth - before, 1);
-                }
             }
         });
         Ok(())
     }
 
     /// The paper's C.
-    pub fn map(&self) -> Result<Vec<bool>, Error> {
-        table(self.right.iter().zip(&self.below).map(|(right, below)| *right || *below))
+    pub fn map(&self, (width, height): (usize, usize)) -> Result<Vec<bool>, Error> {
+        let pixel = |at: usize| (at % width, at / width);
+        let is_change = |at: usize| self.right.has(pixel(at)) || self.below.has(pixel(at));
+        table((0..width * height).map(is_change))
     }
 
     /// Drops the changes that the slope of the surface on both sides explains: on a steep surface neighbours are as far
@@ -134,8 +137,8 @@ impl DepthChanges {
             sides.next() == Some(true) && sides.all(|is_steep| is_steep)
         };
         for (axis, changes) in [&mut self.right, &mut self.below].into_iter().enumerate() {
-            workers.each(changes.chunks_mut(width).enumerate(), |(y, row)| {
-                for_each_mark(row, |x, change| *change = !is_explained(axis, y * width + x));
+            workers.each(changes.rows().enumerate(), |(y, row)| {
+                retain(row, |x| !is_explained(axis, y * width + x));
             });
         }
     }
@@ -148,19 +151,20 @@ impl DepthChanges {
         workers: &Workers,
     ) -> Result<Clean<'_>, Error> {
         let DepthChanges { right, below, spoilt, steps, clean_radii } = self;
-        refill(spoilt, repeat_n(false, width * height))?;
+        spoilt.clear((width, height))?;
         // Both pixels of a change, and those next to them along it.
-        workers.each(spoilt.chunks_mut(width).enumerate(), |(y, spoilt)| {
+        workers.each(spoilt.rows().enumerate(), |(y, spoilt)| {
             for y in y.saturating_sub(1)..(y + 2).min(height) {
-                let right = &right[y * width..][..width];
-                mark(spoilt, right);
-                mark(&mut spoilt[1..], right);
+                for (word, spoilt) in spoilt.iter_mut().enumerate() {
+                    let [own, next, _] = around(right.row(y), word);
+                    *spoilt |= own | next;
+                }
             }
             for y in y.saturating_sub(1)..=y {
-                let below = &below[y * width..][..width];
-                mark(spoilt, below);
-                mark(&mut spoilt[1..], below);
-                mark(spoilt, &below[1..]);
+                for (word, spoilt) in spoilt.iter_mut().enumerate() {
+                    let [own, next, previous] = around(below.row(y), word);
+                    *spoilt |= own | next | previous;
+                }
             }
         });
         // The chessboard distance: along the columns to all pixels, then along the rows to the blocks' middles.
@@ -168,10 +172,14 @@ impl DepthChanges {
         let beside = reach.min(width);
         let stride = beside + width + beside + NUMBERS;
         refill(steps, repeat_n(LARGEST_CLEAN, height * stride))?;
-        for (steps, spoilt) in steps.chunks_mut(stride).zip(spoilt.chunks(width)) {
-            for (to, spoilt) in steps[beside..].iter_mut().zip(spoilt) {
-                *to = if *spoilt { 0 } else { LARGEST_CLEAN };
-            }
+        for (steps, spoilt) in steps.chunks_mut(stride).zip(spoilt.rows()) {
+            retain(spoilt, |x| {
+                let is_inside = x < width;
+                if is_inside {
+                    steps[beside + x] = 0;
+                }
+                is_inside
+            });
         }
         for y in 1..height {
             let (above, row) = steps.split_at_mut(y * stride);
@@ -241,20 +249,18 @@ fn slope(cloud: &Cloud, rect: &Rect, axis: usize) -> Option<f64> {
     (n >= Plane::FEWEST && determinant > 0.0).then(|| slopes[axis] / determinant)
 }
 
-/// Marks what is marked in the other row too.
-fn mark(row: &mut [bool], other: &[bool]) {
-    row.iter_mut().zip(other).for_each(|(to, mark)| *to |= mark);
-}
-
-/// Calls `visit` with the columns of a row that are marked, and the marks. They are few: most of the row is looked at by
-/// sixteens.
-fn for_each_mark(row: &mut [bool], mut visit: impl FnMut(usize, &mut bool)) {
-    const TOGETHER: usize = 16;
-    for (some, first) in row.chunks_mut(TOGETHER).zip((0..).step_by(TOGETHER)) {
-        if *some != [false; TOGETHER] {
-            let marks = some.iter_mut().zip(first..).filter(|(mark, _)| **mark);
-            marks.for_each(|(mark, x)| visit(x, mark));
-        }
+/// Marks the changes between depths and those behind them that `is_change` tells of, and where there is a depth behind a
+/// missing one; from the pixels of number `first` on.
+#[inline(always)]
+pub(crate) fn between(
+    [before, behind]: [&[f32]; 2],
+    [changes, behind_gaps]: [&mut [u64]; 2],
+    first: usize,
+    is_change: impl Fn(f32, f32, usize) -> bool,
+) {
+    for (x, (before, depth)) in before.iter().zip(behind).enumerate().skip(first) {
+        mark(changes, x, is_change(*before, depth - before, 1).into());
+        mark(behind_gaps, x, (before.is_nan() && !depth.is_nan()).into());
     }
 }
 
@@ -263,28 +269,35 @@ mod tests {
     use super::*;
 
     /// Marks a share of the pixels, none if `seed` is 0.
-    fn marks(width: usize, height: usize, seed: usize) -> Vec<bool> {
-        (0..width * height).map(|i| (i * 7919 + seed * 104_729) % 97 < seed % 3).collect()
+    fn marks(width: usize, height: usize, seed: usize) -> Marks {
+        let mut marks = Marks::default();
+        marks.clear((width, height)).unwrap();
+        for (y, row) in marks.rows().enumerate() {
+            let is_marked = |x: &usize| ((y * width + x) * 7919 + seed * 104_729) % 97 < seed % 3;
+            (0..width).filter(is_marked).for_each(|x| mark(row, x, 1));
+        }
+        marks
     }
 
     #[test]
     fn clean_radii_are_chessboard_distances() {
-        let sizes = [(1, 1), (1, 9), (9, 1), (7, 5), (3, 150), (31, 23), (64, 48)];
-        for (seed, (width, height)) in sizes.into_iter().cycle().take(35).enumerate() {
+        let sizes = [(1, 1), (1, 9), (9, 1), (7, 5), (3, 150), (31, 23), (64, 48), (131, 9)];
+        for (seed, (width, height)) in sizes.into_iter().cycle().take(40).enumerate() {
             let (right, below) = (marks(width, height, seed), marks(width, height, seed + 2));
             let mut changes = DepthChanges { right, below, ..DepthChanges::default() };
             for limit in [1, 4, 20, 100] {
                 let found = changes.clean((width, height), limit, &Workers::default()).unwrap();
                 let Clean { spoilt, radii } = found;
-                let (spoilt, radii) = (spoilt.to_vec(), radii.to_vec());
+                let all = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+                let spoilt: Vec<_> = all().map(|pixel| spoilt.has(pixel)).collect();
+                let radii = radii.to_vec();
                 let is_spoilt = |x: usize, y: usize| {
                     let mut changes_near = Rect::around((x, y), 1, (width, height)).pixels();
                     changes_near.any(|(cx, cy)| {
-                        let at = cy * width + cx;
-                        changes.right[at] && cx <= x || changes.below[at] && cy <= y
+                        let DepthChanges { right, below, .. } = &changes;
+                        right.has((cx, cy)) && cx <= x || below.has((cx, cy)) && cy <= y
                     })
                 };
-                let all = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
                 for (x, y) in all() {
                     assert_eq!(spoilt[y * width + x], is_spoilt(x, y));
                 }

@@ -11,6 +11,7 @@ mod creases;
 mod depth_change;
 mod distance;
 mod even_windows;
+mod marks;
 mod methods;
 mod planes;
 mod rect;
@@ -25,9 +26,11 @@ pub(crate) use choices::{
     NO_WINDOW, REACH, places_at,
 };
 pub(crate) use cloud::{CleanPoints, Cleaned, Cloud};
+pub(crate) use depth_change::{DepthChanges, between};
 pub(crate) use even_windows::{
     Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, even_window, even_windows,
 };
+pub(crate) use marks::{WORD, mark};
 pub(crate) use methods::estimate as plain_estimate;
 pub(crate) use planes::{JITTER, Plane, inverse_depth};
 pub(crate) use rect::Rect;
@@ -36,8 +39,6 @@ pub(crate) use smoothing_area::window;
 pub(crate) use summed_area::{ROUNDING, SummedArea};
 
 use std::iter::once;
-
-use depth_change::DepthChanges;
 
 use crate::Error;
 use crate::cloud::Points;
@@ -66,7 +67,7 @@ impl PaperMaps {
         let paper = &options.paper;
         let mut depth_changes = DepthChanges::default();
         find_depth_changes(&mut depth_changes, &cloud, options, &Workers::default())?;
-        let depth_changes = depth_changes.map()?;
+        let depth_changes = depth_changes.map((cloud.width, cloud.height))?;
         let distances = distance::distance_map(
             &depth_changes,
             cloud.width,
@@ -121,20 +122,20 @@ pub(crate) fn estimate_window(
     methods::estimate(options.method, &cleaned, &rect)
 }
 
-fn find_depth_changes(
+/// The changes of a cloud: the plain form.
+pub(crate) fn find_depth_changes(
     changes: &mut DepthChanges,
     cloud: &Cloud,
     options: &Options,
     workers: &Workers,
 ) -> Result<(), Error> {
-    let options = options.clone();
-    changes.find(cloud, workers, move |depth, difference, gap| {
-        is_depth_change(depth, difference, gap, &options)
-    })
+    let is_change =
+        |depth: f32, difference: f32, gap: usize| is_depth_change(depth, difference, gap, options);
+    changes.find(cloud, workers, |depths, marks| between(depths, marks, 0, is_change), is_change)
 }
 
 /// Whether depths that differ by `difference` between pixels `gap` apart are a depth change apart.
-fn is_depth_change(depth: f32, difference: f32, gap: usize, options: &Options) -> bool {
+pub(crate) fn is_depth_change(depth: f32, difference: f32, gap: usize, options: &Options) -> bool {
     match options.semantics {
         Semantics::Paper => smoothing_area::is_depth_change(depth, difference, gap, &options.paper),
         Semantics::Pcl => difference.abs() > least_depth_change(depth, options) * gap as f32,

@@ -9,10 +9,7 @@ use super::creases::SummedNormals;
 use super::depth_change::DepthChanges;
 use super::even_windows::{Asked, EvenWindow};
 use super::rect::Rect;
-use super::{
-    find_depth_changes, is_depth_change, of_radius, rect_around, smoothing_area, surroundings,
-    window,
-};
+use super::{is_depth_change, of_radius, rect_around, smoothing_area, surroundings, window};
 use crate::Error;
 use crate::cloud::Points;
 use crate::memory::{bytes, refill};
@@ -29,6 +26,9 @@ pub(crate) trait Engine {
 
     /// The size of every pixel's own window, as [`Windows`] has them.
     fn sizes(&mut self, sizes: &mut Vec<f32>) -> Result<(), Error>;
+
+    /// The depth changes of a cloud.
+    fn find_depth_changes(&self, changes: &mut DepthChanges, cloud: &Cloud) -> Result<(), Error>;
 
     /// The even windows of all blocks; with their estimates if the method is CM. It may write the estimates of the pixels
     /// that are not `concerned` along with them.
@@ -119,7 +119,7 @@ impl SecondPass {
         if !options.has_second_pass() {
             return refill(&mut self.choices, repeat_n(NO_WINDOW, cloud.depths.len()));
         }
-        find_depth_changes(depth_changes, cloud, options, engine.workers())?;
+        engine.find_depth_changes(depth_changes, cloud)?;
         depth_changes.drop_explained(cloud, engine.workers());
         let size = (cloud.width, cloud.height);
         let limit = options.paper.largest_radius;

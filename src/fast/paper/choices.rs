@@ -9,12 +9,14 @@ use crate::Error;
 use crate::cloud::prefetch;
 use crate::fast::arithmetic::{Floats, dot};
 use crate::fast::lanes::{LANES, Lanes};
+use crate::fast::tile::all;
 use crate::fast::windows::threshold;
 use crate::memory::{bytes, make_room, refill, resize};
 use crate::options::{Options, Semantics};
 use crate::paper::{
     ALIKE, BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows,
-    JITTER, MIDDLE, MISFIT, NEAR, NEAR_NOISE, NEXT, NO_WINDOW, REACH, inverse_depth, places_at,
+    JITTER, MIDDLE, MISFIT, NEAR, NEAR_NOISE, NEXT, NO_WINDOW, REACH, WORD, inverse_depth,
+    places_at,
 };
 use crate::simd::{Along, Groups, Simd, load_by_fours};
 
@@ -820,7 +822,7 @@ impl Rows {
                 *to = if *concerned { *depth } else { f32::NAN };
             }
             // SAFETY: as the caller's.
-            unsafe { self.find_means::<S>(line, &asked.clean.spoilt[pixels]) };
+            unsafe { self.find_means::<S>(line, asked.clean.spoilt.row(y)) };
         }
     }
 
@@ -829,8 +831,8 @@ impl Rows {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn find_means<S: Along>(&mut self, line: usize, spoilt: &[bool]) {
-        let Rows { length, inverse_depths, columns, means, .. } = self;
+    unsafe fn find_means<S: Along>(&mut self, line: usize, spoilt: &[u64]) {
+        let Rows { width, length, inverse_depths, columns, means, .. } = self;
         let rows = [line, line + 1, line + 2].map(|row| &inverse_depths[row * *length..]);
         // SAFETY: as the caller's; rows have room for whole groups.
         unsafe {
@@ -841,19 +843,8 @@ impl Rows {
                 S::store(columns[at..][..S::LANES].as_mut_ptr(), sum);
             }
             let means = &mut means[line * *length + 1..];
-            for x in (0..spoilt.len()).step_by(S::LANES) {
-                let mut own = Lanes::ZERO;
-                if let Some(spoilt) = spoilt.get(x..x + S::LANES) {
-                    // So many are converted together.
-                    for lane in 0..S::LANES {
-                        own.0[lane] = spoilt[lane].into();
-                    }
-                } else {
-                    for (to, spoilt) in own.0.iter_mut().zip(&spoilt[x..]) {
-                        *to = (*spoilt).into();
-                    }
-                }
-                let is_spoilt = S::lt(S::splat(0.0), own.load::<S>());
+            for x in (0..*width).step_by(S::LANES) {
+                let is_spoilt = S::mask((spoilt[x / WORD] >> (x % WORD)) as u32 & all(S::LANES));
                 let [left, own, right] =
                     [x, x + 1, x + 2].map(|column| columns[column..][..S::LANES].as_ptr());
                 let sum = S::add(S::add(S::load(left), S::load(own)), S::load(right));

@@ -4,6 +4,7 @@
 
 mod choices;
 mod chosen;
+mod depth_changes;
 mod depths;
 mod even_windows;
 mod integrals;
@@ -37,7 +38,8 @@ use crate::isa::Isa;
 use crate::memory::{bytes, make_room, resize};
 use crate::options::{DistanceMetric, Method, Options};
 use crate::paper::{
-    Asked, BLOCK, Blocks, Cloud, EvenWindow, EvenWindows, NO_WINDOW, PaperMaps, SecondPass,
+    Asked, BLOCK, Blocks, Cloud, DepthChanges, EvenWindow, EvenWindows, NO_WINDOW, PaperMaps,
+    SecondPass, is_depth_change,
 };
 use crate::simd::{GROUP, Groups};
 use crate::threads::Workers;
@@ -210,6 +212,23 @@ pub(crate) fn read_cloud(
         }
     });
     Ok(())
+}
+
+/// The depth changes of a cloud, as [`find_depth_changes`](crate::paper::find_depth_changes).
+pub(crate) fn find_depth_changes(
+    job: &Job,
+    changes: &mut DepthChanges,
+    cloud: &Cloud,
+    workers: &Workers,
+) -> Result<(), Error> {
+    let &Job { isa, options, .. } = job;
+    let between = |depths: [&[f32]; 2], marks: [&mut [u64]; 2]| {
+        // SAFETY: the processor has the instruction set.
+        unsafe { paths::run(isa, ChangesTask { depths, options, marks }) }
+    };
+    let is_change =
+        |depth: f32, difference: f32, gap: usize| is_depth_change(depth, difference, gap, options);
+    changes.find(cloud, workers, between, is_change)
 }
 
 /// What CM finds along with even windows.
@@ -655,6 +674,24 @@ impl Task for PointsTask<'_> {
     }
 }
 
+/// The depth changes of a row.
+struct ChangesTask<'a> {
+    depths: [&'a [f32]; 2],
+    options: &'a Options,
+    marks: [&'a mut [u64]; 2],
+}
+
+impl Task for ChangesTask<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Groups>(self) {
+        let ChangesTask { depths, options, marks } = self;
+        // SAFETY: as the caller's.
+        unsafe { depth_changes::between::<S::Widest>(depths, options, marks) }
+    }
+}
+
 /// A row of pixels some of which take even windows; no one else writes it.
 struct ChosenTask<'a> {
     row: ChosenRow<'a>,
@@ -798,6 +835,34 @@ mod tests {
                         all.into_iter().map(f32::to_bits).collect::<Vec<_>>()
                     };
                     assert_eq!(bits(&found), bits(&expected), "{isa:?} {width} x {height}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn depth_changes_are_those_of_the_plain_form() {
+        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+            for (width, height) in [(1, 1), (1, 5), (16, 3), (17, 4), (65, 9), (200, 20)] {
+                // Steps, and gaps of all lengths in rows and columns.
+                let value = |i: usize| match (i * 7919 + i / 31) % 23 {
+                    0..6 => f32::NAN,
+                    value => 1.0 + (value / 9) as f32 * 0.2 + (i % 7) as f32 * 0.001,
+                };
+                let z: Vec<_> = (0..width * height).map(value).collect();
+                let points = Points::planes([&z, &z, &z], width, height, 0).unwrap();
+                let mut options = Options::default();
+                for semantics in Semantics::ALL {
+                    options.semantics = semantics;
+                    let cloud = Cloud::new(&points, &options).unwrap();
+                    let job = Job { isa, points: &points, options: &options, whole_points: false };
+                    let workers = Workers::default();
+                    let [mut found, mut expected] = [(); 2].map(|()| DepthChanges::default());
+                    find_depth_changes(&job, &mut found, &cloud, &workers).unwrap();
+                    crate::paper::find_depth_changes(&mut expected, &cloud, &options, &workers)
+                        .unwrap();
+                    let [found, expected] = [found, expected].map(|changes| format!("{changes:?}"));
+                    assert_eq!(found, expected, "{isa:?} {semantics:?} {width} x {height}");
                 }
             }
         }

@@ -308,7 +308,7 @@ pub(super) unsafe fn least_depth_change<S: Simd>(depth: S::F, options: &PaperOpt
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn is_change<S: Simd>(
+pub(super) unsafe fn is_change<S: Simd>(
     depth: S::F,
     neighbour: S::F,
     gap: S::F,

@@ -1,0 +1,75 @@
+//! Marks of an image's pixels, a bit each: what few pixels have is found by words, and many are marked at a time.
+
+use std::iter::repeat_n;
+
+use crate::Error;
+use crate::memory::{bytes, refill};
+
+/// Pixels of a word.
+pub(crate) const WORD: usize = u64::BITS as usize;
+
+/// The marks, row by row: in each, those of the first columns are the lowest bits of the first word. Bits behind the last
+/// column mean nothing.
+#[derive(Debug, Default)]
+pub(crate) struct Marks {
+    /// Words of a row.
+    stride: usize,
+    words: Vec<u64>,
+}
+
+impl Marks {
+    /// Becomes those of an image of this size in which no pixel is marked.
+    pub fn clear(&mut self, (width, height): (usize, usize)) -> Result<(), Error> {
+        self.stride = width.div_ceil(WORD);
+        refill(&mut self.words, repeat_n(0, self.stride * height))
+    }
+
+    /// Bytes held.
+    pub fn size(&self) -> usize {
+        bytes(&self.words)
+    }
+
+    /// Row `y`.
+    #[inline]
+    pub fn row(&self, y: usize) -> &[u64] {
+        &self.words[y * self.stride..][..self.stride]
+    }
+
+    /// All rows.
+    pub fn rows(&mut self) -> impl Iterator<Item = &mut [u64]> + Send {
+        self.words.chunks_mut(self.stride)
+    }
+
+    pub fn has(&self, (x, y): (usize, usize)) -> bool {
+        self.row(y)[x / WORD] >> (x % WORD) & 1 != 0
+    }
+}
+
+/// Marks the pixels of a row from column `x` on whose bits are set; they are in one word.
+#[inline(always)]
+pub(crate) fn mark(row: &mut [u64], x: usize, bits: u64) {
+    row[x / WORD] |= bits << (x % WORD);
+}
+
+/// Calls `stays` with the columns that are marked in a row; where it says no, the mark is taken away.
+pub(crate) fn retain(row: &mut [u64], mut stays: impl FnMut(usize) -> bool) {
+    for (word, first) in row.iter_mut().zip((0..).step_by(WORD)) {
+        let mut left = *word;
+        while left != 0 {
+            let lowest = left & left.wrapping_neg();
+            if !stays(first + left.trailing_zeros() as usize) {
+                *word &= !lowest;
+            }
+            left ^= lowest;
+        }
+    }
+}
+
+/// The marks of a word's pixels, of those before them and of those behind them.
+#[inline(always)]
+pub(crate) fn around(row: &[u64], word: usize) -> [u64; 3] {
+    let own = row[word];
+    let before = if word > 0 { row[word - 1] } else { 0 };
+    let behind = row.get(word + 1).copied().unwrap_or(0);
+    [own, own << 1 | before >> (WORD - 1), own >> 1 | behind << (WORD - 1)]
+}
