@@ -13,7 +13,7 @@ use crate::methods::{Estimate, estimate, estimate_window, start};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
 use crate::paper::{
-    self, Asked, Blocks, Cloud, DepthChanges, EvenWindows, PaperMaps, SecondPass, Windows,
+    self, Asked, Blocks, Cloud, DepthChanges, EvenWindows, Marks, PaperMaps, SecondPass, Windows,
     with_missing_as_nan,
 };
 use crate::smoothing_area::window_side;
@@ -468,7 +468,7 @@ impl paper::Engine for Engine<'_> {
         &mut self,
         cloud: &Cloud,
         asked: &Asked,
-        concerned: &[bool],
+        concerned: &Marks,
         found: &mut Windows,
     ) -> Result<(), Error> {
         let method = Method::CovarianceMatrix;

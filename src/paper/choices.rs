@@ -9,6 +9,7 @@
 use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::cloud::Cloud;
 use super::even_windows::{Asked, EvenWindow};
+use super::marks::Marks;
 use super::planes::{JITTER, inverse_depth};
 use super::rect::Rect;
 use crate::options::Options;
@@ -67,7 +68,7 @@ pub(crate) struct EvenWindows<'a> {
     pub asked: &'a Asked<'a>,
     pub options: &'a Options,
     /// The pixels that may take one.
-    pub concerned: &'a [bool],
+    pub concerned: &'a Marks,
     /// From how many radii at most the windows come that a block's pixels can take, starting with the largest and halving
     /// it, block by block; 0 for a block that takes none.
     pub levels: &'a [u8],
@@ -165,8 +166,7 @@ impl<'a> Candidates<'a> {
         let ends = [(x, cloud.width), (y, cloud.height)].map(|(at, end)| (at + BLOCK).min(end));
         let inside = Rect { x: x..ends[0], y: y..ends[1] };
         let takes_some = |&(x, y): &(usize, usize)| {
-            let at = cloud.index(x, y);
-            concerned[at] && !cloud.is_missing(at)
+            concerned.has((x, y)) && !cloud.is_missing(cloud.index(x, y))
         };
         let pixels: Vec<Pixel> =
             inside.pixels().filter(takes_some).map(|pixel| self.pixel(pixel)).collect();

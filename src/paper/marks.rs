@@ -37,7 +37,12 @@ impl Marks {
 
     /// All rows.
     pub fn rows(&mut self) -> impl Iterator<Item = &mut [u64]> + Send {
-        self.words.chunks_mut(self.stride)
+        self.bands(1)
+    }
+
+    /// All rows, so many or those that are left at a time.
+    pub fn bands(&mut self, rows: usize) -> impl Iterator<Item = &mut [u64]> + Send {
+        self.words.chunks_mut(rows * self.stride)
     }
 
     pub fn has(&self, (x, y): (usize, usize)) -> bool {
@@ -49,6 +54,19 @@ impl Marks {
 #[inline(always)]
 pub(crate) fn mark(row: &mut [u64], x: usize, bits: u64) {
     row[x / WORD] |= bits << (x % WORD);
+}
+
+/// The marks of a word's pixels, or of those that there are.
+#[inline(always)]
+pub(crate) fn word_of(marks: impl Iterator<Item = bool>) -> u64 {
+    // Marked together first, a byte each.
+    let mut bytes = [[0; u8::BITS as usize]; WORD / u8::BITS as usize];
+    for (to, is_marked) in bytes.as_flattened_mut().iter_mut().zip(marks) {
+        *to = is_marked.into();
+    }
+    // The i-th of eight bytes times 2^(56 - 7 i) is bit i of the highest byte, and no other.
+    let bits = |eight: [u8; 8]| u64::from_le_bytes(eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;
+    bytes.into_iter().rev().fold(0, |word, eight| word << u8::BITS | bits(eight))
 }
 
 /// Calls `stays` with the columns that are marked in a row; where it says no, the mark is taken away.
@@ -72,4 +90,21 @@ pub(crate) fn around(row: &[u64], word: usize) -> [u64; 3] {
     let before = if word > 0 { row[word - 1] } else { 0 };
     let behind = row.get(word + 1).copied().unwrap_or(0);
     [own, own << 1 | before >> (WORD - 1), own >> 1 | behind << (WORD - 1)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_have_a_bit_for_each_mark() {
+        for count in [0, 1, 7, 8, 9, 63, 64] {
+            for seed in 0..200_u64 {
+                let random = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+                let word =
+                    random.rotate_left(seed as u32) & u64::MAX.checked_shr(64 - count).unwrap_or(0);
+                assert_eq!(word_of((0..count).map(|i| word >> i & 1 != 0)), word);
+            }
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! The second pass: normals near depth changes and near creases, from even windows.
 
 use std::iter::repeat_n;
+use std::ops::Range;
 
 use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::choices::{EvenWindows, NO_WINDOW};
@@ -8,6 +9,7 @@ use super::cloud::Cloud;
 use super::creases::SummedNormals;
 use super::depth_change::DepthChanges;
 use super::even_windows::{Asked, EvenWindow};
+use super::marks::{Marks, WORD, word_of};
 use super::rect::Rect;
 use super::{is_depth_change, of_radius, rect_around, smoothing_area, surroundings, window};
 use crate::Error;
@@ -36,7 +38,7 @@ pub(crate) trait Engine {
         &mut self,
         cloud: &Cloud,
         asked: &Asked,
-        concerned: &[bool],
+        concerned: &Marks,
         found: &mut Windows,
     ) -> Result<(), Error>;
 
@@ -79,7 +81,7 @@ pub(crate) struct SecondPass {
     windows: Windows,
     normals: SummedNormals,
     /// As [`EvenWindows`] has them.
-    concerned: Vec<bool>,
+    concerned: Marks,
     levels: Vec<u8>,
     choices: Vec<u32>,
     /// Those of windows around the blocks' middle pixels whose estimates are asked for, 0 for none.
@@ -99,7 +101,7 @@ impl SecondPass {
             + bytes(&self.wanted)
             + self.windows.size()
             + self.normals.size()
-            + bytes(&self.concerned)
+            + self.concerned.size()
             + bytes(&self.levels)
             + bytes(&self.choices)
             + bytes(&self.radii)
@@ -138,7 +140,7 @@ impl SecondPass {
                 normals.sum(&windows.of_even, &blocks, engine.workers())?;
             }
         }
-        refill(concerned, repeat_n(false, cloud.depths.len()))?;
+        concerned.clear(size)?;
         refill(levels, repeat_n(0, blocks.count()))?;
         let concern = Concern { cloud, options, blocks: &blocks, sizes: &windows.sizes, normals };
         concern.find(concerned, levels, engine.workers());
@@ -182,7 +184,7 @@ impl SecondPass {
     }
 
     /// The pixels that could take an even window.
-    pub fn concerned(&self) -> &[bool] {
+    pub fn concerned(&self) -> &Marks {
         &self.concerned
     }
 
@@ -201,8 +203,8 @@ impl SecondPass {
 
     /// The estimate, in the paper's semantics, of a pixel that could take an even window but takes none.
     pub fn left(&self, points: &Points, options: &Options, at: usize) -> Option<Estimate> {
-        let is_left = self.concerned[at] && self.choices[at] == NO_WINDOW;
         let pixel = (at % points.width(), at / points.width());
+        let is_left = self.concerned.has(pixel) && self.choices[at] == NO_WINDOW;
         is_left.then(|| of_radius(points, options, pixel, self.windows.sizes[at] as u32))
     }
 
@@ -242,46 +244,63 @@ struct Concern<'a> {
 
 impl Concern<'_> {
     /// Marks them, and the levels of their blocks; none is marked so far.
-    fn find(&self, concerned: &mut [bool], levels: &mut [u8], workers: &Workers) {
-        let &Concern { cloud, options, blocks, .. } = self;
-        let rows = concerned.chunks_mut(BLOCK * cloud.width).enumerate();
-        workers.each(rows.zip(levels.chunks_mut(blocks.across)), |((row, concerned), levels)| {
-            let first = row * BLOCK * cloud.width;
-            if options.one_sided_windows {
-                self.find_one_sided(concerned, first);
-            }
-            for (column, level) in levels.iter_mut().enumerate() {
-                *level = self.level((column, row), first, concerned);
+    fn find(&self, concerned: &mut Marks, levels: &mut [u8], workers: &Workers) {
+        let &Concern { cloud, blocks, .. } = self;
+        let bands = concerned.bands(BLOCK).zip(levels.chunks_mut(blocks.across));
+        workers.each(bands.enumerate(), |(row, (concerned, levels))| {
+            let words = cloud.width.div_ceil(WORD);
+            for (word, levels) in levels.chunks_mut(WORD / BLOCK).enumerate() {
+                let mut of_lines = [0; BLOCK];
+                self.find_in_word((word, row), &mut of_lines, levels);
+                let lines = concerned.chunks_mut(words);
+                lines.zip(of_lines).for_each(|(line, marks)| line[word] = marks);
             }
         });
     }
 
-    /// Marks the pixels from `first` on whose windows are smaller than their depths ask for.
-    fn find_one_sided(&self, concerned: &mut [bool], first: usize) {
-        let &Concern { cloud, sizes, .. } = self;
-        // The loop's own: it is vectorized.
-        let options = self.options.clone();
-        let found = cloud.depths[first..].iter().zip(&sizes[first..]);
-        for (to, (depth, size)) in concerned.iter_mut().zip(found) {
-            // Sizes are whole numbers.
-            *to = size + 1.0 <= wanted_size(*depth, &options);
+    /// As [`Concern::find`], for the blocks whose lines are a word of marks, in a row of blocks: `concerned` are those.
+    fn find_in_word(
+        &self,
+        (word, row): (usize, usize),
+        concerned: &mut [u64; BLOCK],
+        levels: &mut [u8],
+    ) {
+        let &Concern { cloud, options, sizes, .. } = self;
+        let columns = word * WORD..cloud.width.min((word + 1) * WORD);
+        let lines = row * BLOCK..cloud.height.min((row + 1) * BLOCK);
+        let pixels = |y: usize| y * cloud.width + columns.start..y * cloud.width + columns.end;
+        if options.one_sided_windows {
+            for (concerned, y) in concerned.iter_mut().zip(lines.clone()) {
+                *concerned = self.with_small_windows(pixels(y));
+            }
+        }
+        let is_one_sided = concerned.iter().fold(0, |any, line| any | line);
+        let mut beside_creases = 0;
+        for (block, level) in levels.iter_mut().enumerate() {
+            let of_block = ((1 << BLOCK) - 1) << (block * BLOCK);
+            *level = if is_one_sided & of_block != 0 { EVERY_LEVEL } else { 0 };
+            let column = columns.start / BLOCK + block;
+            if options.crease_windows && self.normals_vary((column, row)) {
+                beside_creases |= of_block;
+                *level = CREASE_LEVELS.max(*level);
+            }
+        }
+        if beside_creases != 0 {
+            for (concerned, y) in concerned.iter_mut().zip(lines) {
+                let have_windows = word_of(sizes[pixels(y)].iter().map(|size| *size > 0.0));
+                *concerned |= beside_creases & have_windows;
+            }
         }
     }
 
-    /// The level of a block; marks its pixels near creases. `concerned` starts with pixel number `first`.
-    fn level(&self, block: (usize, usize), first: usize, concerned: &mut [bool]) -> u8 {
-        let &Concern { options, blocks, sizes, .. } = self;
-        let pixels = blocks.pixels(block);
-        let is_one_sided =
-            options.one_sided_windows && pixels.iter().any(|at| concerned[at - first]);
-        let level = if is_one_sided { EVERY_LEVEL } else { 0 };
-        if !(options.crease_windows && self.normals_vary(block)) {
-            return level;
-        }
-        for at in pixels {
-            concerned[at - first] |= sizes[at] > 0.0;
-        }
-        CREASE_LEVELS.max(level)
+    /// The marks of the pixels whose windows are smaller than their depths ask for.
+    fn with_small_windows(&self, pixels: Range<usize>) -> u64 {
+        let &Concern { cloud, sizes, .. } = self;
+        // The loop's own: it is vectorized.
+        let options = self.options.clone();
+        let found = cloud.depths[pixels.clone()].iter().zip(&sizes[pixels]);
+        // Sizes are whole numbers.
+        word_of(found.map(|(depth, size)| size + 1.0 <= wanted_size(*depth, &options)))
     }
 
     /// Whether normals vary where the window of a block's middle pixel is, or else of its first one that has a window.

@@ -817,12 +817,13 @@ impl Rows {
                 continue;
             }
             let pixels = y * width..(y + 1) * width;
-            let own = cloud.depths[pixels.clone()].iter().zip(&concerned[pixels.clone()]);
-            for (to, (depth, concerned)) in self.depths[line * length + 1..].iter_mut().zip(own) {
-                *to = if *concerned { *depth } else { f32::NAN };
-            }
+            let to = &mut self.depths[line * length + 1..][..width];
+            to.copy_from_slice(&cloud.depths[pixels]);
             // SAFETY: as the caller's.
-            unsafe { self.find_means::<S>(line, asked.clean.spoilt.row(y)) };
+            unsafe {
+                keep::<S>(to, concerned.row(y));
+                self.find_means::<S>(line, asked.clean.spoilt.row(y));
+            }
         }
     }
 
@@ -950,6 +951,27 @@ unsafe fn four_points<S: Along>(
             [Floats(x2), Floats(y2), Floats(z2)],
             [Floats(x3), Floats(y3), Floats(z3)],
         ]
+    }
+}
+
+/// Keeps the depths of a row that are marked; the others become NaN.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn keep<S: Simd>(depths: &mut [f32], marks: &[u64]) {
+    let whole = depths.len() / S::LANES * S::LANES;
+    let marks = |x: usize| (marks[x / WORD] >> (x % WORD)) as u32;
+    for x in (0..whole).step_by(S::LANES) {
+        let depths = depths[x..][..S::LANES].as_mut_ptr();
+        // SAFETY: as the caller's; so many elements are there.
+        unsafe {
+            let kept = S::mask(marks(x) & all(S::LANES));
+            S::store(depths, S::select(kept, S::load(depths), S::splat(f32::NAN)));
+        }
+    }
+    for x in whole..depths.len() {
+        depths[x] = if marks(x) & 1 != 0 { depths[x] } else { f32::NAN };
     }
 }
 

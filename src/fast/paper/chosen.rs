@@ -3,9 +3,9 @@
 use crate::cloud::{Normals, Points};
 use crate::fast::arithmetic::Floats;
 use crate::fast::lanes::LANES;
-use crate::fast::tile::{Bits, turned};
+use crate::fast::tile::{Bits, all, turned};
 use crate::options::Options;
-use crate::paper::{Cloud, NO_WINDOW, SecondPass};
+use crate::paper::{Cloud, NO_WINDOW, SecondPass, WORD};
 use crate::simd::{Along, load_by_fours};
 
 /// A row of pixels, some of which take even windows.
@@ -29,7 +29,7 @@ impl ChosenRow<'_> {
         let &ChosenRow { cloud, options, second_pass, normals, y, of_left } = self;
         let (first, of_even) = (y * cloud.width, second_pass.of_even());
         let choices = &second_pass.choices()[first..][..cloud.width];
-        let concerned = &second_pass.concerned()[first..][..cloud.width];
+        let concerned = second_pass.concerned().row(y);
         let whole = cloud.width / S::LANES * S::LANES;
         for x in (0..whole).step_by(S::LANES) {
             let (mut places, mut lanes) = ([0; LANES], 0);
@@ -39,11 +39,8 @@ impl ChosenRow<'_> {
                 lanes |= u32::from(is_chosen) << lane;
             }
             if of_left.is_some() {
-                let mut left = 0;
-                for (lane, concerned) in concerned[x..][..S::LANES].iter().enumerate() {
-                    left |= u32::from(*concerned) << lane;
-                }
-                for lane in Bits(left & !lanes) {
+                let concerned = (concerned[x / WORD] >> (x % WORD)) as u32;
+                for lane in Bits(concerned & all(S::LANES) & !lanes) {
                     self.write_one(x + lane);
                 }
             }

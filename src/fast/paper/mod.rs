@@ -38,8 +38,8 @@ use crate::isa::Isa;
 use crate::memory::{bytes, make_room, resize};
 use crate::options::{DistanceMetric, Method, Options};
 use crate::paper::{
-    Asked, BLOCK, Blocks, Cloud, DepthChanges, EvenWindow, EvenWindows, NO_WINDOW, PaperMaps,
-    SecondPass, is_depth_change,
+    Asked, BLOCK, Blocks, Cloud, DepthChanges, EvenWindow, EvenWindows, Marks, NO_WINDOW,
+    PaperMaps, SecondPass, WORD, is_depth_change, word_of,
 };
 use crate::simd::{GROUP, Groups};
 use crate::threads::Workers;
@@ -147,7 +147,11 @@ pub(crate) fn compute_own(
     normals: &Normals,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
-    let largest = job.own_radii(scratch, choices, |choice| *choice != NO_WINDOW);
+    let width = job.points.width();
+    let largest = job.own_radii(scratch, |y, word| {
+        let choices = choices[y * width..][..width][word * WORD..].iter();
+        word_of(choices.map(|choice| *choice != NO_WINDOW))
+    });
     job.tiles(scratch, indices, normals, largest, 1)
 }
 
@@ -242,7 +246,7 @@ pub(crate) struct Along<'a> {
 /// Pixels' own normals.
 pub(crate) struct Own<'a> {
     /// The pixels that are left out.
-    pub concerned: &'a [bool],
+    pub concerned: &'a Marks,
     /// As [`compute`] has them.
     pub indices: Option<&'a [i32]>,
     pub normals: &'a Normals<'a>,
@@ -450,12 +454,12 @@ impl Job<'_> {
         Ok(largest.into_inner() as usize)
     }
 
-    /// Leaves out the pixels of which `is_left_out` says so; gives the largest radius of the others.
-    fn own_radii<T: Sync>(
+    /// Leaves out the pixels that are marked in what `left_out` gives for a row and a word; gives the largest radius of the
+    /// others.
+    fn own_radii(
         &self,
         scratch: &mut super::Scratch,
-        of_pixels: &[T],
-        is_left_out: impl Fn(&T) -> bool + Sync,
+        left_out: impl Fn(usize, usize) -> u64 + Sync,
     ) -> usize {
         let width = self.points.width();
         let length = row_length(width);
@@ -465,14 +469,11 @@ impl Job<'_> {
         workers.for_each(self.points.height(), |_, y| {
             let at = place_of(chunks, y) * length;
             // SAFETY: each row is one thread's.
-            let row = unsafe { parts.part(at..at + width) };
-            // As integers, radii are in the same order.
-            let mut most = 0;
-            for (radius, of_pixel) in row.iter_mut().zip(&of_pixels[y * width..]) {
-                *radius = if is_left_out(of_pixel) { -1.0 } else { *radius };
-                most = most.max(radius.to_bits() as i32);
-            }
-            largest.fetch_max(f32::from_bits(most as u32) as u32, Ordering::Relaxed);
+            let radii = unsafe { parts.part(at..at + length) };
+            let left_out = |word: usize| left_out(y, word);
+            // SAFETY: the processor has the instruction set.
+            let radius = unsafe { paths::run(self.isa, LeaveOutTask { width, radii, left_out }) };
+            largest.fetch_max(radius as u32, Ordering::Relaxed);
         });
         largest.into_inner() as usize
     }
@@ -565,7 +566,9 @@ impl Job<'_> {
         largest: usize,
     ) -> Result<(), Error> {
         let &Job { points, options, whole_points, .. } = self;
-        let of_own = own.as_ref().map_or(0, |own| self.own_radii(scratch, own.concerned, |is| *is));
+        let of_own = own.as_ref().map_or(0, |Own { concerned, .. }| {
+            self.own_radii(scratch, |y, word| concerned.row(y)[word])
+        });
         let largest = largest.max(of_own);
         let super::Scratch { workers, each, listed, paper, .. } = scratch;
         let (width, height) = (points.width(), points.height());
@@ -721,6 +724,24 @@ impl Task for SweepTask<'_> {
     unsafe fn run<S: Groups>(mut self) -> f32 {
         // SAFETY: as the caller's.
         unsafe { self.sweep.radii::<S::Pair>(&mut self.rows, &self.options.paper) }
+    }
+}
+
+/// The radii of a row, padding and all, that are left where `left_out` does not mark them in a word; gives the largest.
+struct LeaveOutTask<'a, F> {
+    width: usize,
+    radii: &'a mut [f32],
+    left_out: F,
+}
+
+impl<F: Fn(usize) -> u64> Task for LeaveOutTask<'_, F> {
+    type Output = f32;
+
+    #[inline(always)]
+    unsafe fn run<S: Groups>(self) -> f32 {
+        let LeaveOutTask { width, radii, left_out } = self;
+        // SAFETY: as the caller's.
+        unsafe { windows::leave_out::<S::Widest>(width, radii, left_out) }
     }
 }
 
