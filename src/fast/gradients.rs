@@ -17,9 +17,9 @@ pub(crate) type Both<T> = [T; GROUP];
 /// Bytes from a pixel to the next.
 pub(crate) const PIXEL: usize = size_of::<Both<i32>>();
 
-/// Where the second of both begins, and the lanes of the first.
+/// Where the second of both begins, and the lanes of the first, of as many pixels as there are.
 pub(crate) const VERTICAL: usize = 4;
-pub(crate) const HORIZONTAL: u32 = (1 << VERTICAL) - 1;
+pub(crate) const HORIZONTAL: u32 = 0x0f0f_0f0f;
 
 /// What lies between left corners above and below, in bytes, and so many columns to the right: of one window or, in more
 /// lanes than a group has, of several side by side. `pixel` is that of the first, in row 0 of the ring.

@@ -76,12 +76,10 @@ impl Strips {
         let pixels = self.ring.as_ptr().wrapping_add(frame.column(pair.x));
         // SAFETY: as the caller's: no window of the row aimed at is larger, and rows and columns are held.
         unsafe {
-            let one_side = pair.one_side::<S::Pair>(0, lanes);
-            if let Some(side) = one_side.filter(|side| side % 2 == 0) {
-                let [above, both, _] = *self.places.get_unchecked(side);
+            if let Some(side) = pair.one_side::<S::Pair>(0, lanes) {
+                let left = *self.places.get_unchecked(side);
                 for lane in (0..LANES).step_by(S::Widest::LANES / GROUP) {
-                    let pixel = pixels.wrapping_add(lane);
-                    let both = between::<S::Widest>(pixel, [above, both], side);
+                    let both = gradients::<S::Widest>(pixels.wrapping_add(lane), left, side);
                     S::Widest::store(to.add(GROUP * lane), S::Widest::float_i(both));
                 }
                 return;
@@ -89,17 +87,33 @@ impl Strips {
             for first in (0..LANES).step_by(GROUP) {
                 let sides = pair.sides::<S>(first, lanes >> first);
                 for (lane, side) in (first..).zip(sides) {
-                    let (pixel, side) = (pixels.wrapping_add(lane), side as usize);
-                    let [above, horizontal, vertical] = *self.places.get_unchecked(side);
-                    let mut both = between::<S>(pixel, [above, horizontal], side & !1);
-                    if side % 2 != 0 {
-                        let vertical = between::<S>(pixel, [above, vertical], side);
-                        both = S::select_i(HORIZONTAL, both, vertical);
-                    }
+                    let side = side as usize;
+                    let left = *self.places.get_unchecked(side);
+                    let both = gradients::<S>(pixels.wrapping_add(lane), left, side);
                     S::store(to.add(GROUP * lane), S::float_i(both));
                 }
             }
         }
+    }
+}
+
+/// Both gradients of windows of one side, with left corners as [`Strips::places`] has them: as [`between`].
+///
+/// # Safety
+/// As there.
+#[inline(always)]
+unsafe fn gradients<S: Simd>(
+    pixel: *const Both<i32>,
+    [above, horizontal, vertical]: [usize; 3],
+    side: usize,
+) -> S::I {
+    // SAFETY: as the caller's.
+    unsafe {
+        let both = between::<S>(pixel, [above, horizontal], side & !1);
+        if side.is_multiple_of(2) {
+            return both;
+        }
+        S::select_i(HORIZONTAL, both, between::<S>(pixel, [above, vertical], side))
     }
 }
 
