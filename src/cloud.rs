@@ -581,11 +581,17 @@ impl Normals<'_> {
         columns: &Range<usize>,
     ) {
         let step = self.grid.point_stride;
-        let at = |x: usize, y: usize| self.normal[0].wrapping_byte_add(self.grid.offset(x, y));
-        let (nx, ahead) = (at(x, y), x + PIXELS_AHEAD);
-        let is_in_row = ahead < columns.end;
-        let ahead = if is_in_row { at(ahead, y) } else { at(ahead - columns.len(), y + 1) };
-        prefetch_for_writing(ahead, S::LANES, step);
+        let nx = self.normal[0].wrapping_byte_add(self.grid.offset(x, y));
+        let (mut column, mut ahead) = (x + PIXELS_AHEAD, PIXELS_AHEAD.wrapping_mul(step));
+        if column >= columns.end {
+            column -= columns.len();
+            let row = columns.len().wrapping_mul(step);
+            ahead = ahead.wrapping_add(self.grid.row_stride).wrapping_sub(row);
+        }
+        // Those of narrow tiles are not so far ahead.
+        if column < columns.end {
+            prefetch_for_writing(nx.wrapping_byte_add(ahead), S::LANES, step);
+        }
         // SAFETY: as the caller's.
         unsafe {
             if let Some(place) = self.side_by_side {

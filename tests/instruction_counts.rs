@@ -39,7 +39,7 @@ const BOUNDS: [(Semantics, Method, BorderPolicy, u64, u64); 10] = [
     (Pcl, Average3DGradient, Mirror, 136, 227),
     (Pcl, AverageDepthChange, Ignore, 101, 176),
     (Pcl, AverageDepthChange, Mirror, 199, 282),
-    (Pcl, Simple3DGradient, Ignore, 104, 184),
+    (Pcl, Simple3DGradient, Ignore, 114, 205),
     (Paper, CovarianceMatrix, Ignore, 236, 469),
     (Paper, Average3DGradient, Ignore, 167, 318),
     (Paper, AverageDepthChange, Ignore, 176, 312),

@@ -1,109 +1,47 @@
-//! Windows of one size for all pixels of a group at once: as many times as a group has sizes.
+//! Windows of one size for all pixels of a group at once, as many times as a group has sizes: for AVERAGE_DEPTH_CHANGE.
 
-use std::marker::PhantomData;
-
+use super::arithmetic::Floats;
+use super::depth::Depth;
+use super::half_windows::{HalfWindows, Tangents};
 use super::planes::{Frame, Planes};
-use super::tile::{Pair, Sums, Tile, contains};
+use super::run::OfRun;
+use super::tile::{Pair, Tile, contains};
 use crate::simd::{GROUP, Groups, Simd};
-use crate::window::Image;
 
-/// Sums whose lanes are pixels side by side, with windows of one size.
-pub(crate) trait BySide: Sums {
-    /// The sums of as many windows as there are lanes.
-    type OfLanes<S: Simd>: Copy;
-    /// The sums of one window.
-    type Of1;
-
-    /// Whether a window of an odd side has the sums of the next smaller one's.
-    const EVEN: bool;
-
-    /// The sums of the windows of `side` x `side` around the pixels from `x` on, one in each lane, of the row aimed
-    /// at. The windows, and the pixels around them, lie inside the image and hold finite points only.
-    ///
-    /// # Safety
-    /// As [`Sums::note`].
-    unsafe fn of_pixels<S: Simd>(
-        &self,
-        frame: &Frame,
-        planes: &Planes,
-        x: usize,
-        side: usize,
-    ) -> Self::OfLanes<S>;
-
-    /// `mask ? yes : no`
-    ///
-    /// # Safety
-    /// As [`Sums::push`].
-    unsafe fn select<S: Simd>(
-        lanes: u32,
-        yes: Self::OfLanes<S>,
-        no: Self::OfLanes<S>,
-    ) -> Self::OfLanes<S>;
-
-    /// The sums of one window that crosses the border of the image and is mirrored there; none if this method
-    /// leaves such windows to the plain form.
-    fn of_mirrored(
-        &self,
-        frame: &Frame,
-        planes: &Planes,
-        image: &Image,
-        pixel: (usize, usize),
-        side: usize,
-    ) -> Option<Self::Of1>;
-
-    /// Sums to put lanes into.
-    ///
-    /// # Safety
-    /// As [`Sums::push`].
-    unsafe fn none<S: Simd>() -> Self::OfLanes<S>;
-
-    /// Replaces one lane.
-    ///
-    /// # Safety
-    /// As [`Sums::push`].
-    unsafe fn put<S: Simd>(sums: &mut Self::OfLanes<S>, lane: usize, one: Self::Of1);
-
-    /// Notes what the normals of the pixels from `at` on in a run are made from.
-    ///
-    /// # Safety
-    /// As [`Sums::push`].
-    unsafe fn note_lanes<S: Simd>(sums: Self::OfLanes<S>, run: &mut Self::OfRun, at: usize);
-}
-
-/// [`Sums::note`]
+/// [`Sums::note`](super::tile::Sums::note)
 ///
 /// # Safety
 /// As there.
 #[inline(always)]
-pub(crate) unsafe fn note<S: Groups, M: BySide>(
-    sums: &M,
+pub(crate) unsafe fn note<S: Groups, T: Depth>(
+    sums: &HalfWindows<T>,
     tile: &Tile,
     frame: &Frame,
     planes: &Planes,
     pair: &Pair,
-    run: &mut M::OfRun,
+    run: &mut OfRun<f32, 6>,
     at: usize,
 ) -> u32 {
     // SAFETY: as the caller's; the frame holds the largest side around every pixel of the tile.
     unsafe {
-        let [first, second] = [Group::<S, M>::new(pair, 0), Group::new(pair, GROUP)];
+        let [first, second] = [Group::<S>::new(pair, 0), Group::new(pair, GROUP)];
         if let (Some(side), Some(other)) = (first.one_side(), second.one_side())
             && side == other
         {
             let both = sums.of_pixels::<S::Pair>(frame, planes, first.x, side);
-            M::note_lanes::<S::Pair>(both, run, at);
+            note_lanes::<S::Pair>(both, run, at);
             return 0;
         }
         let (of8, plain) = first.sum_up(sums, tile, frame, planes);
-        M::note_lanes::<S>(of8, run, at);
+        note_lanes::<S>(of8, run, at);
         let (of8, more_plain) = second.sum_up(sums, tile, frame, planes);
-        M::note_lanes::<S>(of8, run, at + GROUP);
+        note_lanes::<S>(of8, run, at + GROUP);
         plain | more_plain << GROUP
     }
 }
 
 /// Eight pixels of a row and their windows.
-struct Group<'a, S: Groups, M> {
+struct Group<'a, S: Groups> {
     /// The first pixel.
     x: usize,
     y: usize,
@@ -114,10 +52,9 @@ struct Group<'a, S: Groups, M> {
     windows: u32,
     /// Whether windows of any of the tile's sides are inside the image here.
     inner: bool,
-    method: PhantomData<M>,
 }
 
-impl<'a, S: Groups, M: BySide> Group<'a, S, M> {
+impl<'a, S: Groups> Group<'a, S> {
     /// The group of a pair that begins with `lane`.
     ///
     /// # Safety
@@ -128,13 +65,12 @@ impl<'a, S: Groups, M: BySide> Group<'a, S, M> {
         let windows = pair.windows >> lane & ((1 << GROUP) - 1);
         // SAFETY: as the caller's.
         unsafe {
-            let mut sides = S::load(row.as_ptr().add(x));
-            if M::EVEN {
-                let halves = S::truncate(S::mul(sides, S::splat(0.5)));
-                sides = S::add(halves, halves);
-            }
+            // A window of an odd side has the sums of the next smaller one's.
+            let sides = S::load(row.as_ptr().add(x));
+            let halves = S::truncate(S::mul(sides, S::splat(0.5)));
+            let sides = S::add(halves, halves);
             let inner = pair.is_inner(lane, GROUP);
-            Group { x, y, row, sides, windows, inner, method: PhantomData }
+            Group { x, y, row, sides, windows, inner }
         }
     }
 
@@ -158,16 +94,12 @@ impl<'a, S: Groups, M: BySide> Group<'a, S, M> {
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn next_windows(&self, todo: u32) -> (u32, usize) {
-        let mut side = self.row[self.x + todo.trailing_zeros() as usize];
+        let side = self.row[self.x + todo.trailing_zeros() as usize];
         // SAFETY: as the caller's; sides are whole numbers that fit i32.
         unsafe {
-            let mut whole = side.to_int_unchecked::<i32>();
-            if M::EVEN {
-                whole &= !1;
-                side = whole as f32;
-            }
-            let same = S::bits(S::eq(self.sides, S::splat(side))) & todo;
-            (same, whole as usize)
+            let side = side.to_int_unchecked::<i32>() & !1;
+            let same = S::bits(S::eq(self.sides, S::splat(side as f32))) & todo;
+            (same, side as usize)
         }
     }
 
@@ -176,25 +108,25 @@ impl<'a, S: Groups, M: BySide> Group<'a, S, M> {
     /// # Safety
     /// As [`note`].
     #[inline(always)]
-    unsafe fn sum_up(
+    unsafe fn sum_up<T: Depth>(
         &self,
-        sums: &M,
+        sums: &HalfWindows<T>,
         tile: &Tile,
         frame: &Frame,
         planes: &Planes,
-    ) -> (M::OfLanes<S>, u32) {
+    ) -> (Tangents<Floats<S>>, u32) {
         let (mut plain, mut todo) = (0, self.windows);
         // SAFETY: as the caller's.
         unsafe {
             if todo == 0 {
-                return (M::none::<S>(), 0);
+                return (none(), 0);
             }
             let (same, side) = self.next_windows(todo);
             todo &= !same;
             let mut of8 = if self.is_inside(tile, same, side) {
                 sums.of_pixels::<S>(frame, planes, self.x, side)
             } else {
-                let mut of8 = M::none::<S>();
+                let mut of8 = none();
                 plain |= self.put_crossing(sums, tile, frame, planes, same, side, &mut of8);
                 of8
             };
@@ -203,7 +135,7 @@ impl<'a, S: Groups, M: BySide> Group<'a, S, M> {
                 todo &= !same;
                 if self.is_inside(tile, same, side) {
                     let these = sums.of_pixels::<S>(frame, planes, self.x, side);
-                    of8 = M::select::<S>(same, these, of8);
+                    take(&mut of8, same, these);
                 } else {
                     plain |= self.put_crossing(sums, tile, frame, planes, same, side, &mut of8);
                 }
@@ -229,22 +161,24 @@ impl<'a, S: Groups, M: BySide> Group<'a, S, M> {
     /// As [`note`].
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
-    unsafe fn put_crossing(
+    unsafe fn put_crossing<T: Depth>(
         &self,
-        sums: &M,
+        sums: &HalfWindows<T>,
         tile: &Tile,
         frame: &Frame,
         planes: &Planes,
         lanes: u32,
         side: usize,
-        of8: &mut M::OfLanes<S>,
+        of8: &mut Tangents<Floats<S>>,
     ) -> u32 {
         let ones = self.crossing(sums, tile, frame, planes, lanes, side);
         let mut plain = lanes;
         for (lane, one) in ones.into_iter().enumerate() {
             if let Some(one) = one {
                 // SAFETY: as the caller's.
-                unsafe { M::put::<S>(of8, lane, one) };
+                let one = one.map(|tangent| tangent.map(|c| unsafe { Floats::splat(c) }));
+                // SAFETY: as the caller's.
+                unsafe { take(of8, 1 << lane, one) };
                 plain &= !(1 << lane);
             }
         }
@@ -254,15 +188,15 @@ impl<'a, S: Groups, M: BySide> Group<'a, S, M> {
     /// The sums of windows that cross the border of the image, but of those that are left to the plain form.
     // No instructions of `S` in here: they would not be inlined into a function of its own.
     #[cold]
-    fn crossing(
+    fn crossing<T: Depth>(
         &self,
-        sums: &M,
+        sums: &HalfWindows<T>,
         tile: &Tile,
         frame: &Frame,
         planes: &Planes,
         lanes: u32,
         side: usize,
-    ) -> [Option<M::Of1>; GROUP] {
+    ) -> [Option<Tangents<f32>>; GROUP] {
         std::array::from_fn(|lane| {
             let pixel = (self.x + lane, self.y);
             // By the window's own side: whether it fits the image depends on that.
@@ -272,4 +206,44 @@ impl<'a, S: Groups, M: BySide> Group<'a, S, M> {
             sums.of_mirrored(frame, planes, tile.image, pixel, side)
         })
     }
+}
+
+/// No pixel's.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn none<S: Simd>() -> Tangents<Floats<S>> {
+    // SAFETY: as the caller's.
+    [[unsafe { Floats::splat(0.0) }; 3]; 2]
+}
+
+/// Takes others in some lanes.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn take<S: Simd>(
+    tangents: &mut Tangents<Floats<S>>,
+    lanes: u32,
+    others: Tangents<Floats<S>>,
+) {
+    // SAFETY: as the caller's.
+    let mask = unsafe { S::mask(lanes) };
+    for g in 0..2 {
+        for c in 0..3 {
+            tangents[g][c].take(mask, others[g][c]);
+        }
+    }
+}
+
+/// Notes what the normals of the pixels from `at` on in a run are made from.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn note_lanes<S: Simd>(tangents: Tangents<Floats<S>>, run: &mut OfRun<f32, 6>, at: usize) {
+    let [[a, b, c], [d, e, f]] = tangents;
+    // SAFETY: as the caller's.
+    unsafe { run.store::<S>(at, [a, b, c, d, e, f]) }
 }

@@ -55,7 +55,7 @@ impl Noted for Gradients {}
 impl Gradients {
     /// Where those of the pixels from `at` on, as many as there are lanes, are noted.
     #[inline(always)]
-    pub fn from(&mut self, at: usize) -> *mut f32 {
+    pub fn place(&mut self, at: usize) -> *mut f32 {
         self.0[at..at + LANES].as_mut_ptr().cast()
     }
 

@@ -4,7 +4,7 @@
 
 use super::arithmetic::{Floats, cross, dot};
 use super::buffer::Buffer;
-use super::by_side::{self, BySide};
+use super::by_side;
 use super::depth::Depth;
 use super::planes::{Corners, Frame, MARGIN, Planes, sum_between};
 use super::run::OfRun;
@@ -31,7 +31,7 @@ pub(crate) struct HalfWindows<T> {
 }
 
 /// Horizontal and vertical tangent.
-type Tangents<T> = [[T; 3]; 2];
+pub(super) type Tangents<T> = [[T; 3]; 2];
 
 /// A normal is doubtful where floats could turn it by more than 1e-4: (sine of the angle between the tangents) < 1e-3.
 const DOUBT_SINE: f32 = 1e-6;
@@ -55,7 +55,7 @@ impl Places {
         let (half, quarter) = (half as isize, (half / 2) as isize);
         // Integrals end before a half window and with it.
         let ends = |first: isize| [first - 1, first + half - 1];
-        let half_window = |x: isize, row: isize| frame.corners(1, y, ends(row), ends(x));
+        let half_window = |x: isize, row: isize| frame.corners(y, ends(row), ends(x));
         let point = |x: isize, row: isize| {
             frame.start(3, y.wrapping_add_signed(row)).wrapping_add_signed(x)
         };
@@ -95,6 +95,93 @@ impl<T: Depth> HalfWindows<T> {
         };
         along(rect.y.end).minus(along(rect.y.start))
     }
+
+    /// The tangents of the windows of `side` x `side` around the pixels from `x` on, one in each lane, of the row aimed at. The
+    /// windows, and the pixels around them, lie inside the image and hold finite points only.
+    ///
+    /// # Safety
+    /// As [`Sums::note`].
+    #[inline(always)]
+    pub unsafe fn of_pixels<S: Simd>(
+        &self,
+        frame: &Frame,
+        planes: &Planes,
+        x: usize,
+        side: usize,
+    ) -> Tangents<Floats<S>> {
+        let half = side / 2;
+        let Places { halves, share, ends } = &self.places[half];
+        let x = frame.column(x);
+        // SAFETY: as the caller's: rows and columns are held, and so are the lanes from these columns on.
+        unsafe {
+            let mut tangents = if half == 1 {
+                let plane = planes.as_ptr().add(x + 2 * frame.stride);
+                let z = |place: usize| Floats::<S>::load(plane.wrapping_add(place));
+                let ([left, right], [above, below]) = (ends[0], self.rows);
+                [[z(right) - z(left); 3], [z(below) - z(above); 3]]
+            } else {
+                let ring = self.integrals.as_ptr().add(x);
+                let [left, right, up, down] = halves;
+                let sum = |half: &Corners| sum_between::<S, T>(ring, half);
+                let (across, along) = (sum(right) - sum(left), sum(down) - sum(up));
+                let share = Floats::<S>::splat(*share);
+                [[T::floats::<S>(across) * share; 3], [T::floats::<S>(along) * share; 3]]
+            };
+            for c in 0..2 {
+                let plane = planes.as_ptr().add(x + c * frame.stride);
+                let point = |end: usize| Floats::load(plane.wrapping_add(end));
+                for g in 0..2 {
+                    tangents[g][c] = point(ends[g][1]) - point(ends[g][0]);
+                }
+            }
+            tangents
+        }
+    }
+
+    /// Those of a window that crosses the border of the image and is mirrored there; none if it is left to the plain form.
+    pub fn of_mirrored(
+        &self,
+        frame: &Frame,
+        planes: &Planes,
+        image: &Image,
+        (x, y): (usize, usize),
+        side: usize,
+    ) -> Option<Tangents<f32>> {
+        let (half, quarter) = (side / 2, (side / 4) as isize);
+        if half == 1 {
+            return None; // floats decide there
+        }
+        let scale = f64::from(self.scale);
+        let own = T::of_one(planes.row(frame, 2, y)[frame.column(x)] * self.scale);
+        let (x, y) = (x as isize, y as isize);
+        let mean = |start: (isize, isize)| {
+            let (mut sum, mut count) = (T::default(), 0_i32);
+            for rect in image.rects(start, (half, half)) {
+                if rect.x.is_empty() || rect.y.is_empty() {
+                    continue;
+                }
+                let of_rect = self.sum(frame, &rect);
+                sum = if rect.sign > 0 { sum.plus(of_rect) } else { sum.minus(of_rect) };
+                count += rect.sign * (rect.x.len() * rect.y.len()) as i32;
+            }
+            (count > 0).then(|| sum.about(own, count) / (scale * f64::from(count)))
+        };
+        let left = mean((x - half as isize, y - quarter))?;
+        let right = mean((x + 1, y - quarter))?;
+        let up = mean((x - quarter, y - half as isize))?;
+        let down = mean((x - quarter, y + 1))?;
+        let point = |x, y| {
+            let (x, y) = image.pixel(x, y);
+            [0, 1].map(|c| planes.row(frame, c, y)[frame.column(x)])
+        };
+        let difference = |a: [f32; 2], b: [f32; 2], z| [a[0] - b[0], a[1] - b[1], z];
+        let horizontal = [point(x + quarter + 1, y), point(x - quarter - 1, y)];
+        let vertical = [point(x + 1, y + quarter), point(x - 1, y - quarter)];
+        Some([
+            difference(horizontal[0], horizontal[1], (right - left) as f32),
+            difference(vertical[0], vertical[1], (down - up) as f32),
+        ])
+    }
 }
 
 impl<T: Depth> Sums for HalfWindows<T> {
@@ -105,12 +192,12 @@ impl<T: Depth> Sums for HalfWindows<T> {
     const LIMITED: bool = false;
 
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {
-        frame.reserve_ring(1, &mut self.integrals)?;
+        frame.reserve_ring(&mut self.integrals)?;
         make_room(&mut self.places, side / 2 + 1)
     }
 
     fn start(&mut self, frame: &Frame, limit: f32, _side: usize, _origin: [f32; 3]) {
-        self.pushed = frame.start_ring(1, &mut self.integrals);
+        self.pushed = frame.start_ring(&mut self.integrals);
         let error = T::error(self.scale, limit, frame.columns.len() * frame.rows.len());
         self.doubt = (DOUBT_ROUNDING * error * error) as f32;
     }
@@ -163,7 +250,7 @@ impl<T: Depth> Sums for HalfWindows<T> {
         at: usize,
     ) -> u32 {
         // SAFETY: as the caller's.
-        unsafe { by_side::note::<S, Self>(self, tile, frame, planes, pair, run, at) }
+        unsafe { by_side::note::<S, T>(self, tile, frame, planes, pair, run, at) }
     }
 
     #[inline(always)]
@@ -202,139 +289,5 @@ impl<T: Depth> Sums for HalfWindows<T> {
                 doubtful: !(exact & sine.max(least).lt(n2) | floats_decide),
             }
         }
-    }
-}
-
-impl<T: Depth> BySide for HalfWindows<T> {
-    type OfLanes<S: Simd> = Tangents<Floats<S>>;
-    type Of1 = Tangents<f32>;
-
-    const EVEN: bool = true;
-
-    #[inline(always)]
-    unsafe fn of_pixels<S: Simd>(
-        &self,
-        frame: &Frame,
-        planes: &Planes,
-        x: usize,
-        side: usize,
-    ) -> Self::OfLanes<S> {
-        let half = side / 2;
-        let Places { halves, share, ends } = &self.places[half];
-        let x = frame.column(x);
-        // SAFETY: as the caller's: rows and columns are held, and so are the lanes from these columns on.
-        unsafe {
-            let mut tangents = if half == 1 {
-                let plane = planes.as_ptr().add(x + 2 * frame.stride);
-                let z = |place: usize| Floats::<S>::load(plane.wrapping_add(place));
-                let ([left, right], [above, below]) = (ends[0], self.rows);
-                [[z(right) - z(left); 3], [z(below) - z(above); 3]]
-            } else {
-                let ring = self.integrals.as_ptr().add(x);
-                let [left, right, up, down] = halves;
-                let sum = |half: &Corners| sum_between::<S, T>(ring, half);
-                let (across, along) = (sum(right) - sum(left), sum(down) - sum(up));
-                let share = Floats::<S>::splat(*share);
-                [[T::floats::<S>(across) * share; 3], [T::floats::<S>(along) * share; 3]]
-            };
-            for c in 0..2 {
-                let plane = planes.as_ptr().add(x + c * frame.stride);
-                let point = |end: usize| Floats::load(plane.wrapping_add(end));
-                for g in 0..2 {
-                    tangents[g][c] = point(ends[g][1]) - point(ends[g][0]);
-                }
-            }
-            tangents
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn select<S: Simd>(
-        lanes: u32,
-        yes: Self::OfLanes<S>,
-        no: Self::OfLanes<S>,
-    ) -> Self::OfLanes<S> {
-        let mut tangents = no;
-        for g in 0..2 {
-            for c in 0..3 {
-                // SAFETY: as the caller's.
-                let lane = unsafe { S::select(S::mask(lanes), yes[g][c].0, no[g][c].0) };
-                tangents[g][c] = Floats(lane);
-            }
-        }
-        tangents
-    }
-
-    #[inline(always)]
-    unsafe fn none<S: Simd>() -> Self::OfLanes<S> {
-        // SAFETY: as the caller's.
-        [[unsafe { Floats::splat(0.0) }; 3]; 2]
-    }
-
-    fn of_mirrored(
-        &self,
-        frame: &Frame,
-        planes: &Planes,
-        image: &Image,
-        (x, y): (usize, usize),
-        side: usize,
-    ) -> Option<Self::Of1> {
-        let (half, quarter) = (side / 2, (side / 4) as isize);
-        if half == 1 {
-            return None; // floats decide there
-        }
-        let scale = f64::from(self.scale);
-        let own = T::of_one(planes.row(frame, 2, y)[frame.column(x)] * self.scale);
-        let (x, y) = (x as isize, y as isize);
-        let mean = |start: (isize, isize)| {
-            let (mut sum, mut count) = (T::default(), 0_i32);
-            for rect in image.rects(start, (half, half)) {
-                if rect.x.is_empty() || rect.y.is_empty() {
-                    continue;
-                }
-                let of_rect = self.sum(frame, &rect);
-                sum = if rect.sign > 0 { sum.plus(of_rect) } else { sum.minus(of_rect) };
-                count += rect.sign * (rect.x.len() * rect.y.len()) as i32;
-            }
-            (count > 0).then(|| sum.about(own, count) / (scale * f64::from(count)))
-        };
-        let left = mean((x - half as isize, y - quarter))?;
-        let right = mean((x + 1, y - quarter))?;
-        let up = mean((x - quarter, y - half as isize))?;
-        let down = mean((x - quarter, y + 1))?;
-        let point = |x, y| {
-            let (x, y) = image.pixel(x, y);
-            [0, 1].map(|c| planes.row(frame, c, y)[frame.column(x)])
-        };
-        let difference = |a: [f32; 2], b: [f32; 2], z| [a[0] - b[0], a[1] - b[1], z];
-        let horizontal = [point(x + quarter + 1, y), point(x - quarter - 1, y)];
-        let vertical = [point(x + 1, y + quarter), point(x - 1, y - quarter)];
-        Some([
-            difference(horizontal[0], horizontal[1], (right - left) as f32),
-            difference(vertical[0], vertical[1], (down - up) as f32),
-        ])
-    }
-
-    #[inline(always)]
-    unsafe fn put<S: Simd>(tangents: &mut Self::OfLanes<S>, lane: usize, one: Self::Of1) {
-        for g in 0..2 {
-            for c in 0..3 {
-                // SAFETY: as the caller's.
-                let with =
-                    unsafe { S::select(S::mask(1 << lane), S::splat(one[g][c]), tangents[g][c].0) };
-                tangents[g][c] = Floats(with);
-            }
-        }
-    }
-
-    #[inline(always)]
-    unsafe fn note_lanes<S: Simd>(
-        tangents: Tangents<Floats<S>>,
-        run: &mut OfRun<f32, 6>,
-        at: usize,
-    ) {
-        let [[a, b, c], [d, e, f]] = tangents;
-        // SAFETY: as the caller's.
-        unsafe { run.store::<S>(at, [a, b, c, d, e, f]) }
     }
 }

@@ -261,14 +261,14 @@ impl Sums for Moments {
     const LIMITED: bool = false;
 
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {
-        frame.reserve_ring(1, &mut self.most)?;
-        frame.reserve_ring(1, &mut self.z)?;
+        frame.reserve_ring(&mut self.most)?;
+        frame.reserve_ring(&mut self.z)?;
         make_room(&mut self.places, side + 1)
     }
 
     fn start(&mut self, frame: &Frame, _limit: f32, _side: usize, origin: [f32; 3]) {
-        frame.start_ring(1, &mut self.most);
-        self.pushed = frame.start_ring(1, &mut self.z);
+        frame.start_ring(&mut self.most);
+        self.pushed = frame.start_ring(&mut self.z);
         self.origin = origin;
     }
 

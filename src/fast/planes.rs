@@ -84,34 +84,29 @@ impl Frame {
         place * planes * self.stride
     }
 
-    /// Makes room for a ring of so many planes, and for a row after it.
-    pub fn reserve_ring<T: Number>(
-        &self,
-        planes: usize,
-        ring: &mut Buffer<T>,
-    ) -> Result<(), Error> {
-        ring.grow(self.start_of(planes, self.ring + 1))
+    /// Makes room for a ring of one plane, and for a row after it.
+    pub fn reserve_ring<T: Number>(&self, ring: &mut Buffer<T>) -> Result<(), Error> {
+        ring.grow(self.start_of(1, self.ring + 1))
     }
 
-    /// Makes the row after a ring of so many planes one of zeros, and returns its place: it is what is above the first
+    /// Makes the row after a ring of one plane one of zeros, and returns its place: it is what is above the first
     /// row that will be pushed.
-    pub fn start_ring<T: Number + Default>(&self, planes: usize, ring: &mut Buffer<T>) -> usize {
-        let zeros = self.start_of(planes, self.ring)..self.start_of(planes, self.ring + 1);
+    pub fn start_ring<T: Number + Default>(&self, ring: &mut Buffer<T>) -> usize {
+        let zeros = self.start_of(1, self.ring)..self.start_of(1, self.ring + 1);
         ring[zeros].fill(T::default());
         self.ring
     }
 
     /// The corners of what lies between two rows, counted from row `y`, and two columns, counted from a pixel's, in a
-    /// ring of so many planes.
+    /// ring of one plane.
     pub fn corners(
         &self,
-        planes: usize,
         y: usize,
         [above, below]: [isize; 2],
         [left, right]: [isize; 2],
     ) -> Corners {
         let at = |row: isize, column: isize| {
-            self.start(planes, y.wrapping_add_signed(row)).wrapping_add_signed(column)
+            self.start(1, y.wrapping_add_signed(row)).wrapping_add_signed(column)
         };
         [at(above, left), at(above, right), at(below, left), at(below, right)]
     }

@@ -72,7 +72,7 @@ impl Strips {
         run: &mut Gradients,
         at: usize,
     ) {
-        let to = run.from(at);
+        let to = run.place(at);
         let pixels = self.ring.as_ptr().wrapping_add(frame.column(pair.x));
         // SAFETY: as the caller's: no window of the row aimed at is larger, and rows and columns are held.
         unsafe {

@@ -13,7 +13,7 @@ use std::ops::Range;
 
 use super::blocks::Blocks;
 use super::cloud::Cloud;
-use super::marks::{Marks, around, mark, retain};
+use super::marks::{Marks, WORD, around, columns, mark};
 use super::planes::{JITTER, Plane, inverse_depth};
 use super::rect::Rect;
 use crate::Error;
@@ -59,7 +59,7 @@ impl DepthChanges {
     }
 
     /// Becomes the changes of a cloud: `is_change(depth, difference, gap)` says whether a difference in depth to the
-    /// neighbour `gap` pixels to the right or below is one; `between` is [`between`], or does the same.
+    /// neighbour `gap` pixels to the right or below is one; no NaN is. `between` is [`between`], or does the same.
     pub fn find(
         &mut self,
         cloud: &Cloud,
@@ -82,15 +82,14 @@ impl DepthChanges {
                 behind_gaps.fill(0);
                 let before = &depths[row..][..behind.len()];
                 between([before, &depths[behind.clone()]], [changes, behind_gaps]);
-                retain(behind_gaps, |x| {
+                for x in columns(behind_gaps) {
                     let at = behind.start + x;
                     let is_change = cloud.gap(at, axis).is_some_and(|gap| {
                         let before = depths[at - gap * [1, width][axis]];
                         is_change(before, depths[at] - before, gap)
                     });
                     mark(changes, x, is_change.into());
-                    true
-                });
+                }
             }
         });
         Ok(())
@@ -138,7 +137,11 @@ impl DepthChanges {
         };
         for (axis, changes) in [&mut self.right, &mut self.below].into_iter().enumerate() {
             workers.each(changes.rows().enumerate(), |(y, row)| {
-                retain(row, |x| !is_explained(axis, y * width + x));
+                for (word, first) in row.iter_mut().zip((y * width..).step_by(WORD)) {
+                    let marks = [*word];
+                    let explained = columns(&marks).filter(|x| is_explained(axis, first + x));
+                    *word &= !explained.fold(0, |all, x| all | 1 << x);
+                }
             });
         }
     }
@@ -152,8 +155,14 @@ impl DepthChanges {
     ) -> Result<Clean<'_>, Error> {
         let DepthChanges { right, below, spoilt, steps, clean_radii } = self;
         spoilt.clear((width, height))?;
+        // The chessboard distance: along the columns to all pixels, then along the rows to the blocks' middles.
+        let reach = (limit as usize).min(width.max(height)).min(LARGEST_CLEAN as usize);
+        let beside = reach.min(width);
+        let stride = beside + width + beside + NUMBERS;
+        refill(steps, repeat_n(LARGEST_CLEAN, height * stride))?;
         // Both pixels of a change, and those next to them along it.
-        workers.each(spoilt.rows().enumerate(), |(y, spoilt)| {
+        let rows = spoilt.rows().zip(steps.chunks_mut(stride)).enumerate();
+        workers.each(rows, |(y, (spoilt, steps))| {
             for y in y.saturating_sub(1)..(y + 2).min(height) {
                 for (word, spoilt) in spoilt.iter_mut().enumerate() {
                     let [own, next, _] = around(right.row(y), word);
@@ -166,21 +175,9 @@ impl DepthChanges {
                     *spoilt |= own | next | previous;
                 }
             }
+            // Marks may go on behind the last column.
+            columns(spoilt).take_while(|x| *x < width).for_each(|x| steps[beside + x] = 0);
         });
-        // The chessboard distance: along the columns to all pixels, then along the rows to the blocks' middles.
-        let reach = (limit as usize).min(width.max(height)).min(LARGEST_CLEAN as usize);
-        let beside = reach.min(width);
-        let stride = beside + width + beside + NUMBERS;
-        refill(steps, repeat_n(LARGEST_CLEAN, height * stride))?;
-        for (steps, spoilt) in steps.chunks_mut(stride).zip(spoilt.rows()) {
-            retain(spoilt, |x| {
-                let is_inside = x < width;
-                if is_inside {
-                    steps[beside + x] = 0;
-                }
-                is_inside
-            });
-        }
         for y in 1..height {
             let (above, row) = steps.split_at_mut(y * stride);
             step_from(&mut row[..stride], &above[(y - 1) * stride..]);

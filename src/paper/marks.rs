@@ -35,6 +35,11 @@ impl Marks {
         &self.words[y * self.stride..][..self.stride]
     }
 
+    /// Words of a row.
+    pub fn stride(&self) -> usize {
+        self.stride
+    }
+
     /// All rows.
     pub fn rows(&mut self) -> impl Iterator<Item = &mut [u64]> + Send {
         self.bands(1)
@@ -69,18 +74,16 @@ pub(crate) fn word_of(marks: impl Iterator<Item = bool>) -> u64 {
     bytes.into_iter().rev().fold(0, |word, eight| word << u8::BITS | bits(eight))
 }
 
-/// Calls `stays` with the columns that are marked in a row; where it says no, the mark is taken away.
-pub(crate) fn retain(row: &mut [u64], mut stays: impl FnMut(usize) -> bool) {
-    for (word, first) in row.iter_mut().zip((0..).step_by(WORD)) {
+/// The columns that are marked in a row.
+pub(crate) fn columns(row: &[u64]) -> impl Iterator<Item = usize> {
+    row.iter().zip((0..).step_by(WORD)).flat_map(|(word, first)| {
         let mut left = *word;
-        while left != 0 {
-            let lowest = left & left.wrapping_neg();
-            if !stays(first + left.trailing_zeros() as usize) {
-                *word &= !lowest;
-            }
-            left ^= lowest;
-        }
-    }
+        std::iter::from_fn(move || {
+            let lowest = left.trailing_zeros() as usize;
+            left &= left.wrapping_sub(1);
+            (lowest < WORD).then_some(first + lowest)
+        })
+    })
 }
 
 /// The marks of a word's pixels, of those before them and of those behind them.

@@ -243,12 +243,11 @@ struct Concern<'a> {
 }
 
 impl Concern<'_> {
-    /// Marks them, and the levels of their blocks; none is marked so far.
+    /// Marks them, and the levels of their blocks.
     fn find(&self, concerned: &mut Marks, levels: &mut [u8], workers: &Workers) {
-        let &Concern { cloud, blocks, .. } = self;
-        let bands = concerned.bands(BLOCK).zip(levels.chunks_mut(blocks.across));
+        let (words, across) = (concerned.stride(), self.blocks.across);
+        let bands = concerned.bands(BLOCK).zip(levels.chunks_mut(across));
         workers.each(bands.enumerate(), |(row, (concerned, levels))| {
-            let words = cloud.width.div_ceil(WORD);
             for (word, levels) in levels.chunks_mut(WORD / BLOCK).enumerate() {
                 let mut of_lines = [0; BLOCK];
                 self.find_in_word((word, row), &mut of_lines, levels);
@@ -258,7 +257,8 @@ impl Concern<'_> {
         });
     }
 
-    /// As [`Concern::find`], for the blocks whose lines are a word of marks, in a row of blocks: `concerned` are those.
+    /// As [`Concern::find`], for the blocks whose lines are a word of marks, in a row of blocks. `concerned` are those words;
+    /// none is marked so far.
     fn find_in_word(
         &self,
         (word, row): (usize, usize),

@@ -727,7 +727,7 @@ impl Task for SweepTask<'_> {
     }
 }
 
-/// The radii of a row, padding and all, that are left where `left_out` does not mark them in a word; gives the largest.
+/// The radii of a row, as [`windows::leave_out`] has it.
 struct LeaveOutTask<'a, F> {
     width: usize,
     radii: &'a mut [f32],
@@ -864,7 +864,7 @@ mod tests {
     #[test]
     fn depth_changes_are_those_of_the_plain_form() {
         for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
-            for (width, height) in [(1, 1), (1, 5), (16, 3), (17, 4), (65, 9), (200, 20)] {
+            for (width, height) in [(1, 1), (1, 5), (16, 3), (17, 4), (64, 9), (65, 9), (128, 20)] {
                 // Steps, and gaps of all lengths in rows and columns.
                 let value = |i: usize| match (i * 7919 + i / 31) % 23 {
                     0..6 => f32::NAN,
@@ -884,6 +884,28 @@ mod tests {
                         .unwrap();
                     let [found, expected] = [found, expected].map(|changes| format!("{changes:?}"));
                     assert_eq!(found, expected, "{isa:?} {semantics:?} {width} x {height}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn pixels_are_left_out() {
+        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+            for width in [1, 15, 16, 63, 64, 65, 130] {
+                let is_left_out = |x: usize| x * 7919 % 5 < 2;
+                let radius = |x: usize| (x * 31 % 17) as f32;
+                let mut radii = vec![40.0; row_length(width)];
+                (0..width).for_each(|x| radii[x] = radius(x));
+                let left_out =
+                    |word: usize| word_of((0..WORD).map(|x| is_left_out(word * WORD + x)));
+                let task = LeaveOutTask { width, radii: &mut radii, left_out };
+                // SAFETY: the processor has the instruction set.
+                let largest = unsafe { paths::run(isa, task) };
+                let left = (0..width).filter(|x| !is_left_out(*x));
+                assert_eq!(largest, left.map(radius).fold(0.0, f32::max));
+                for (x, found) in radii[..width].iter().enumerate() {
+                    assert_eq!(*found, if is_left_out(x) { -1.0 } else { radius(x) });
                 }
             }
         }
