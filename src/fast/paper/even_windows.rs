@@ -256,23 +256,28 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
         let &Eight { pixels, block, asked, .. } = eight;
         let y = rings.aimed.y;
         let hides_some = rings.layer.hides_some();
-        let [mut wanted, mut clean, mut largest] = [[0.0; GROUP]; 3];
-        for lane in Bits(asked) {
-            wanted[lane] = windows_asked.wanted[block + lane] as f32;
-            clean[lane] = windows_asked.clean.radii[block + lane].into();
-            largest[lane] = (windows_asked.largest(block + lane) as f32).min(clean[lane]);
+        let [mut wanted, mut clean] = [[0.0; GROUP]; 2];
+        let of_blocks = block..block + windows.len();
+        for (to, from) in wanted.iter_mut().zip(&windows_asked.wanted[of_blocks.clone()]) {
+            *to = *from as f32;
+        }
+        for (to, from) in clean.iter_mut().zip(&windows_asked.clean.radii[of_blocks]) {
+            *to = f32::from(*from);
         }
         // SAFETY: as the caller's.
         unsafe {
             let [wanted, clean] =
                 [Floats::<S>::load(wanted.as_ptr()), Floats::load(clean.as_ptr())];
-            let largest = Floats::<S>::load(largest.as_ptr());
+            // As `Asked::largest` has it.
+            let limit = Floats::<S>::splat(windows_asked.limit as f32);
+            let largest = S::min((wanted + wanted).0, S::min(limit.0, clean.0));
+            let largest = Floats(S::and(S::mask(asked), largest));
             let (zero, one) = (Floats::<S>::splat(0.0), Floats::<S>::splat(1.0));
             let least = Doubles::splat(f64::from(self.even.asked.least_noise));
             let smallest = Floats::splat(JAGGED_RADIUS as f32 - 1.0);
             // On steep surfaces, windows with depth changes; then, or else, windows without, and smaller ones while those
             // are much more even.
-            let mut jagged = clean.lt(wanted) & smallest.lt(wanted);
+            let mut jagged = asked & clean.lt(wanted) & smallest.lt(wanted);
             let mut even = zero.lt(largest) & !jagged;
             let mut radii = largest;
             radii.take(S::mask(jagged), wanted);
