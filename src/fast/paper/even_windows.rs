@@ -455,39 +455,31 @@ unsafe fn write<S: Groups>(
     asked: u32,
     windows: &mut [EvenWindow],
 ) {
+    const { assert!(size_of::<EvenWindow>() == size_of::<[f32; 12]>()) };
     let &Fits { q, ray, unevenness, steepness_squared, .. } = fits;
-    let mut fields = [[0.0; GROUP]; 11];
-    // SAFETY: as the caller's; the arrays hold so many lanes.
+    let mut found = [EvenWindow::default(); GROUP];
+    // SAFETY: as the caller's; a window is twelve floats.
     unsafe {
-        let steepness = steepness_squared.narrow().sqrt();
-        let noise = fits.noise();
+        // As `EvenWindow::worth` has it.
+        let (one, points) = (Floats::splat(1.0), fits.points().narrow());
+        let side = Floats::splat(2.0) * radii + one;
+        let per_bend = one / (side * side);
+        let per_noise = Floats::splat(12.0) / points * per_bend;
         let ([a, b, c], [x, y, z]) = (q, ray);
-        let values = [
-            radii,
-            a.narrow(),
-            b.narrow(),
-            c.narrow(),
-            x.narrow(),
-            y.narrow(),
-            z.narrow(),
-            steepness,
-            unevenness.narrow(),
-            noise.narrow(),
-            fits.points().narrow(),
+        let steepness = steepness_squared.narrow().sqrt();
+        let fours = [
+            [radii, a.narrow(), b.narrow(), c.narrow()],
+            [x.narrow(), y.narrow(), z.narrow(), steepness],
+            [unevenness.narrow(), fits.noise().narrow(), per_noise, per_bend],
         ];
-        for i in 0..values.len() {
-            S::store(fields[i].as_mut_ptr(), values[i].0);
+        let to = found.as_mut_ptr().cast::<f32>();
+        for (fields, place) in fours.into_iter().zip((0..).step_by(4)) {
+            let fields = fields.map(|field| S::and(S::mask(there), field.0));
+            S::store_points(fields, 3, to.add(place), size_of::<EvenWindow>());
         }
     }
     for lane in Bits(asked) {
-        windows[lane] = EvenWindow::default();
-        if there >> lane & 1 == 1 {
-            let [radius, a, b, c, x, y, z, steepness, unevenness, noise, points] =
-                fields.each_ref().map(|field| field[lane]);
-            let (q, ray) = ([a, b, c], [x, y, z]);
-            let worth = EvenWindow::worth(radius as u32, points);
-            windows[lane] = EvenWindow { q, ray, steepness, unevenness, noise, ..worth };
-        }
+        windows[lane] = found[lane];
     }
 }
 
