@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::layers::Layer;
 use super::presence::{Presence, Size};
+use super::rects::Pixels;
 use crate::Error;
 use crate::cloud::Points;
 use crate::fast::arithmetic::{Doubles, Floats};
@@ -239,6 +240,34 @@ impl<const N: usize> Rings<N> {
             below: self.fields(y + 1),
             plane: self.stride,
         }
+    }
+
+    /// A field of eight pixels' points, of a row that is held. Of blocks, the last one may be cut: the image's last column
+    /// stands for its middle.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    pub unsafe fn of_pixels<S: Groups>(
+        &self,
+        row: &Around,
+        field: usize,
+        &Pixels { x, step, width }: &Pixels,
+    ) -> Floats<S> {
+        if step == 1 {
+            // SAFETY: as the caller's.
+            return unsafe { row.at(self.place(x)).own(field) };
+        }
+        debug_assert!(step <= BLOCK);
+        let first = row.own.wrapping_add(field * row.plane);
+        let mut eight = [0.0; GROUP];
+        for (lane, to) in eight.iter_mut().enumerate() {
+            let place = self.place((x + lane * step).min(width - 1));
+            // SAFETY: behind the last row there is room for so many.
+            *to = unsafe { *first.wrapping_add(place) };
+        }
+        // SAFETY: as the caller's.
+        unsafe { Floats::load(eight.as_ptr()) }
     }
 
     /// Aims at the windows around the pixels of row `y` in an image of this height.
@@ -518,27 +547,6 @@ impl Around {
         }
     }
 
-    /// A field of eight points, up to `BLOCK` columns apart.
-    ///
-    /// # Safety
-    /// As [`Around::own`].
-    #[inline(always)]
-    pub unsafe fn apart<S: Groups>(&self, field: usize, step: usize) -> Floats<S> {
-        debug_assert!(step <= BLOCK);
-        let first = self.own.wrapping_add(field * self.plane);
-        // SAFETY: as the caller's; behind the last row there is room for so many.
-        unsafe {
-            if step == 1 {
-                return Floats::load(first);
-            }
-            let mut eight = [0.0; GROUP];
-            for (lane, to) in eight.iter_mut().enumerate() {
-                *to = *first.wrapping_add(lane * step);
-            }
-            Floats::load(eight.as_ptr())
-        }
-    }
-
     /// A field of eight points.
     ///
     /// # Safety
@@ -546,7 +554,7 @@ impl Around {
     #[inline(always)]
     pub unsafe fn own<S: Groups>(&self, field: usize) -> Floats<S> {
         // SAFETY: as the caller's.
-        unsafe { self.apart(field, 1) }
+        unsafe { Floats::load(self.own.wrapping_add(field * self.plane)) }
     }
 
     /// A field of the points to the left and to the right.

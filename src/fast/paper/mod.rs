@@ -827,6 +827,7 @@ impl Task for ChoicesTask<'_, '_> {
 mod tests {
     use super::*;
     use crate::options::Semantics;
+    use crate::paper::of_radius;
 
     #[test]
     fn clouds_are_read_as_in_the_plain_form() {
@@ -906,6 +907,49 @@ mod tests {
                 assert_eq!(largest, left.map(radius).fold(0.0, f32::max));
                 for (x, found) in radii[..width].iter().enumerate() {
                     assert_eq!(*found, if is_left_out(x) { -1.0 } else { radius(x) });
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn blocks_have_the_normals_of_the_plain_form() {
+        let height = 30;
+        for (isa, width) in Isa::ALL.into_iter().flat_map(|isa| (40..44).map(move |w| (isa, w))) {
+            if !isa.is_available() {
+                continue;
+            }
+            let point = |i: usize| {
+                let (x, y) = ((i % width) as f32 - 20.0, (i / width) as f32 - 15.0);
+                let z = 1.0 + 0.004 * x + 0.002 * y + 0.0001 * x * x;
+                [x * z / 60.0, y * z / 60.0, if i % 37 == 5 { f32::NAN } else { z }]
+            };
+            let values: Vec<_> = (0..width * height).flat_map(point).collect();
+            let points = Points::interleaved(&values, width, height, 3, 0).unwrap();
+            let mut options = Options { semantics: Semantics::Paper, ..Options::default() };
+            let blocks = Blocks::of(width, height);
+            let radii: Vec<_> = (0..blocks.count()).map(|block| block as u32 % 7).collect();
+            for method in
+                [Method::CovarianceMatrix, Method::Average3DGradient, Method::AverageDepthChange]
+            {
+                options.method = method;
+                let job = Job { isa, points: &points, options: &options, whole_points: false };
+                let mut scratch = super::super::Scratch::default();
+                job.depths(&mut scratch).unwrap();
+                let mut found = vec![0.0; 4 * blocks.count()];
+                let (across, down) = (blocks.across, blocks.down);
+                let normals =
+                    Normals::interleaved(&mut found, across, down, 4, 0, Some(3)).unwrap();
+                compute_of_blocks(&job, &radii, &normals, &mut scratch).unwrap();
+                for (block, found) in found.chunks(4).enumerate() {
+                    let pixel = blocks.middle(block);
+                    let expected = of_radius(&points, &options, pixel, radii[block]).normal;
+                    for (found, expected) in found.iter().zip(expected) {
+                        let is_near = (found - expected).abs() < 1e-4;
+                        let both_none = found.is_nan() && expected.is_nan();
+                        let what = format!("{isa:?} {method:?} {width}: {block}");
+                        assert!(is_near || both_none, "{what}: {found} for {expected}");
+                    }
                 }
             }
         }

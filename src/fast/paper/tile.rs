@@ -213,16 +213,17 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                         Rects::new(rings, &pixels, Floats(eight), windows, last)
                     };
                     let sums = rects.sums(rings, M::EDGE);
-                    let own = points.at(rings.place(pixels.x));
                     if PARTIAL && layer.hides_some() {
                         let lanes = with_hidden::<S, M, N>(&sums, &rects, rings, windows)
-                            | own.apart::<S>(WEIGHT, step).lt(Floats::splat(1.0));
+                            | rings.of_pixels::<S>(&points, WEIGHT, &pixels).lt(Floats::splat(1.0));
                         hidden[pair] |= (windows & lanes) << shift;
                         run.lanes[pair] &= !(lanes << shift);
                     }
                     M::note::<S>(&sums, &rects, rings, windows, &mut run.sums, at);
-                    let own = [own.apart(0, step), own.apart(1, step), own.apart(2, step)];
-                    run.points.store::<S>(at, own);
+                    let x = rings.of_pixels(&points, 0, &pixels);
+                    let y = rings.of_pixels(&points, 1, &pixels);
+                    let z = rings.of_pixels(&points, 2, &pixels);
+                    run.points.store::<S>(at, [x, y, z]);
                 }
             }
             if PARTIAL {
