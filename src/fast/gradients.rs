@@ -6,9 +6,10 @@
 
 use super::arithmetic::{Floats, cross, dot};
 use super::lanes::LANES;
+use super::planes::Frame;
 use super::run::{Noted, RUN};
-use super::tile::Found;
-use crate::simd::{GROUP, Simd};
+use super::tile::{Found, Pair};
+use crate::simd::{GROUP, Groups, Simd};
 
 /// x, y and z and nothing of something horizontal; and of something vertical. All of a pixel's are read at once, whatever
 /// the windows of its neighbours.
@@ -20,6 +21,22 @@ pub(crate) const PIXEL: usize = size_of::<Both<i32>>();
 /// Where the second of both begins, and the lanes of the first, of as many pixels as there are.
 pub(crate) const VERTICAL: usize = 4;
 pub(crate) const HORIZONTAL: u32 = 0x0f0f_0f0f;
+
+/// Where in a ring of both a pixel is that is so many rows and columns from one of row `y`, from that one's column on: in
+/// bytes, which addresses are made of at once.
+pub(crate) fn place(frame: &Frame, y: usize, [row, column]: [isize; 2]) -> usize {
+    let pixel = frame.start(1, y.wrapping_add_signed(row)).wrapping_add_signed(column);
+    pixel.wrapping_mul(PIXEL)
+}
+
+/// The left corners of windows of a side, as [`place`] has them.
+pub(crate) trait LeftCorners: Copy {
+    /// Both gradients of one window or of several, as [`between`].
+    ///
+    /// # Safety
+    /// As there.
+    unsafe fn gradients<S: Simd>(self, pixel: *const Both<i32>, side: usize) -> S::I;
+}
 
 /// What lies between left corners above and below, in bytes, and so many columns to the right: of one window or, in more
 /// lanes than a group has, of several side by side. `pixel` is that of the first, in row 0 of the ring.
@@ -53,10 +70,43 @@ impl Default for Gradients {
 impl Noted for Gradients {}
 
 impl Gradients {
-    /// Where those of the pixels from `at` on, as many as there are lanes, are noted.
+    /// Notes the windows of a pair's `lanes`, which are inside the image, `at` in the run; the others' gradients mean nothing.
+    /// `places` are by the side of a window.
+    ///
+    /// # Safety
+    /// As [`Sums::note`](super::tile::Sums::note); there are places for the windows' sides.
     #[inline(always)]
-    pub fn place(&mut self, at: usize) -> *mut f32 {
-        self.0[at..at + LANES].as_mut_ptr().cast()
+    pub unsafe fn note<S: Groups, L: LeftCorners>(
+        &mut self,
+        ring: &[Both<i32>],
+        places: &[L],
+        frame: &Frame,
+        pair: &Pair,
+        lanes: u32,
+        at: usize,
+    ) {
+        let to = self.0[at..at + LANES].as_mut_ptr().cast::<f32>();
+        let pixels = ring.as_ptr().wrapping_add(frame.column(pair.x));
+        // SAFETY: as the caller's: rows and columns are held.
+        unsafe {
+            if let Some(side) = pair.one_side::<S::Pair>(0, lanes) {
+                let left = *places.get_unchecked(side);
+                for lane in (0..LANES).step_by(S::Widest::LANES / GROUP) {
+                    let both = left.gradients::<S::Widest>(pixels.wrapping_add(lane), side);
+                    S::Widest::store(to.add(GROUP * lane), S::Widest::float_i(both));
+                }
+                return;
+            }
+            for first in (0..LANES).step_by(GROUP) {
+                let sides = pair.sides::<S>(first, lanes >> first);
+                for (lane, side) in (first..).zip(sides) {
+                    let side = side as usize;
+                    let left = *places.get_unchecked(side);
+                    let both = left.gradients::<S>(pixels.wrapping_add(lane), side);
+                    S::store(to.add(GROUP * lane), S::float_i(both));
+                }
+            }
+        }
     }
 
     pub fn put(&mut self, at: usize, both: Both<f32>) {

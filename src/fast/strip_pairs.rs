@@ -6,8 +6,7 @@
 //! whatever the windows of its neighbours.
 
 use super::buffer::Buffer;
-use super::gradients::{Both, Gradients, PIXEL, Scale, VERTICAL, between};
-use super::lanes::LANES;
+use super::gradients::{Both, Gradients, LeftCorners, PIXEL, Scale, VERTICAL, between, place};
 use super::planes::{Frame, MARGIN, Planes};
 use super::tile::{Bits, Found, Pair, Sums, Tile};
 use crate::Error;
@@ -75,43 +74,6 @@ impl StripPairs {
         }
     }
 
-    /// Notes the windows of a pair's `lanes`, which are inside the image; the others' gradients mean nothing.
-    ///
-    /// # Safety
-    /// As [`Sums::note`].
-    #[inline(always)]
-    unsafe fn note_inside<S: Groups>(
-        &self,
-        frame: &Frame,
-        pair: &Pair,
-        lanes: u32,
-        run: &mut Gradients,
-        at: usize,
-    ) {
-        let to = run.place(at);
-        let pixels = self.ring.as_ptr().wrapping_add(frame.column(pair.x));
-        // SAFETY: as the caller's: no window of the row aimed at is larger, and rows and columns are held.
-        unsafe {
-            if let Some(side) = pair.one_side::<S::Pair>(0, lanes) {
-                let left = *self.places.get_unchecked(side);
-                for lane in (0..LANES).step_by(S::Widest::LANES / GROUP) {
-                    let both = between::<S::Widest>(pixels.wrapping_add(lane), left, side);
-                    S::Widest::store(to.add(GROUP * lane), S::Widest::float_i(both));
-                }
-                return;
-            }
-            for first in (0..LANES).step_by(GROUP) {
-                let sides = pair.sides::<S>(first, lanes >> first);
-                for (lane, side) in (first..).zip(sides) {
-                    let side = side as usize;
-                    let left = *self.places.get_unchecked(side);
-                    let both = between::<S>(pixels.wrapping_add(lane), left, side);
-                    S::store(to.add(GROUP * lane), S::float_i(both));
-                }
-            }
-        }
-    }
-
     /// Notes the windows of some lanes of a pair that cross the border of the image; returns the lanes whose windows
     /// are left to the plain form.
     #[cold]
@@ -162,6 +124,14 @@ impl StripPairs {
     }
 }
 
+impl LeftCorners for [usize; 2] {
+    #[inline(always)]
+    unsafe fn gradients<S: Simd>(self, pixel: *const Both<i32>, side: usize) -> S::I {
+        // SAFETY: as the caller's.
+        unsafe { between::<S>(pixel, self, side) }
+    }
+}
+
 impl Sums for StripPairs {
     type OfRun = Gradients;
 
@@ -196,16 +166,12 @@ impl Sums for StripPairs {
     }
 
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
-        let place = |row: isize, column: isize| {
-            let pixel = frame.start(1, y.wrapping_add_signed(row)).wrapping_add_signed(column);
-            pixel.wrapping_mul(PIXEL)
-        };
         let places = |side: usize| {
             let half = (side / 2) as isize;
-            [place(-half - 1, -half), place(side as isize - half - 1, -half)]
+            [-half - 1, side as isize - half - 1].map(|row| place(frame, y, [row, -half]))
         };
         self.places.clear();
-        self.places.push([place(0, 0); 2]);
+        self.places.push([place(frame, y, [0, 0]); 2]);
         self.places.extend((1..=side).map(places));
     }
 
@@ -222,7 +188,7 @@ impl Sums for StripPairs {
         let inside = tile.inside(pair);
         if inside != 0 {
             // SAFETY: as the caller's.
-            unsafe { self.note_inside::<S>(frame, pair, inside, run, at) };
+            unsafe { run.note::<S, _>(&self.ring, &self.places, frame, pair, inside, at) };
         }
         let crossing = pair.windows & !inside;
         if crossing == 0 { 0 } else { self.note_crossing(tile, frame, pair, crossing, run, at) }

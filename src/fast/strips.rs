@@ -5,8 +5,9 @@
 //! counted from where both have the same corners if the window's side is even.
 
 use super::buffer::Buffer;
-use super::gradients::{Both, Gradients, HORIZONTAL, PIXEL, Scale, VERTICAL, between};
-use super::lanes::LANES;
+use super::gradients::{
+    Both, Gradients, HORIZONTAL, LeftCorners, PIXEL, Scale, VERTICAL, between, place,
+};
 use super::planes::{Frame, MARGIN, Planes};
 use super::tile::{Found, Pair, Sums, Tile};
 use crate::Error;
@@ -58,62 +59,20 @@ impl Strips {
             }
         }
     }
-
-    /// Notes the windows of a pair's `lanes`, which are inside the image; the others' gradients mean nothing.
-    ///
-    /// # Safety
-    /// As [`Sums::note`].
-    #[inline(always)]
-    unsafe fn note_inside<S: Groups>(
-        &self,
-        frame: &Frame,
-        pair: &Pair,
-        lanes: u32,
-        run: &mut Gradients,
-        at: usize,
-    ) {
-        let to = run.place(at);
-        let pixels = self.ring.as_ptr().wrapping_add(frame.column(pair.x));
-        // SAFETY: as the caller's: no window of the row aimed at is larger, and rows and columns are held.
-        unsafe {
-            if let Some(side) = pair.one_side::<S::Pair>(0, lanes) {
-                let left = *self.places.get_unchecked(side);
-                for lane in (0..LANES).step_by(S::Widest::LANES / GROUP) {
-                    let both = gradients::<S::Widest>(pixels.wrapping_add(lane), left, side);
-                    S::Widest::store(to.add(GROUP * lane), S::Widest::float_i(both));
-                }
-                return;
-            }
-            for first in (0..LANES).step_by(GROUP) {
-                let sides = pair.sides::<S>(first, lanes >> first);
-                for (lane, side) in (first..).zip(sides) {
-                    let side = side as usize;
-                    let left = *self.places.get_unchecked(side);
-                    let both = gradients::<S>(pixels.wrapping_add(lane), left, side);
-                    S::store(to.add(GROUP * lane), S::float_i(both));
-                }
-            }
-        }
-    }
 }
 
-/// Both gradients of windows of one side, with left corners as [`Strips::places`] has them: as [`between`].
-///
-/// # Safety
-/// As there.
-#[inline(always)]
-unsafe fn gradients<S: Simd>(
-    pixel: *const Both<i32>,
-    [above, horizontal, vertical]: [usize; 3],
-    side: usize,
-) -> S::I {
-    // SAFETY: as the caller's.
-    unsafe {
-        let both = between::<S>(pixel, [above, horizontal], side & !1);
-        if side.is_multiple_of(2) {
-            return both;
+impl LeftCorners for [usize; 3] {
+    #[inline(always)]
+    unsafe fn gradients<S: Simd>(self, pixel: *const Both<i32>, side: usize) -> S::I {
+        let [above, horizontal, vertical] = self;
+        // SAFETY: as the caller's.
+        unsafe {
+            let both = between::<S>(pixel, [above, horizontal], side & !1);
+            if side.is_multiple_of(2) {
+                return both;
+            }
+            S::select_i(HORIZONTAL, both, between::<S>(pixel, [above, vertical], side))
         }
-        S::select_i(HORIZONTAL, both, between::<S>(pixel, [above, vertical], side))
     }
 }
 
@@ -146,14 +105,10 @@ impl Sums for Strips {
     }
 
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
-        let place = |row: isize, column: isize| {
-            let pixel = frame.start(1, y.wrapping_add_signed(row)).wrapping_add_signed(column);
-            pixel.wrapping_mul(PIXEL)
-        };
         // Columns end before the window and with it; rows are kept one row higher.
         let places = |side: usize| {
             let half = (side / 2) as isize;
-            [-half - 1, side as isize - half - 1, half - 1].map(|row| place(row, -half))
+            [-half - 1, side as isize - half - 1, half - 1].map(|row| place(frame, y, [row, -half]))
         };
         self.places.clear();
         self.places.extend((0..=side).map(places));
@@ -172,7 +127,7 @@ impl Sums for Strips {
         let inside = tile.inside(pair);
         if inside != 0 {
             // SAFETY: as the caller's.
-            unsafe { self.note_inside::<S>(frame, pair, inside, run, at) };
+            unsafe { run.note::<S, _>(&self.ring, &self.places, frame, pair, inside, at) };
         }
         pair.windows & !inside // the method has no mirrored windows
     }
