@@ -51,8 +51,14 @@ impl Marks {
     }
 
     pub fn has(&self, (x, y): (usize, usize)) -> bool {
-        self.row(y)[x / WORD] >> (x % WORD) & 1 != 0
+        from(self.row(y), x) & 1 != 0
     }
+}
+
+/// The marks of a row's pixels from column `x` to the end of the word, from the lowest bit on.
+#[inline(always)]
+pub(crate) fn from(row: &[u64], x: usize) -> u64 {
+    row[x / WORD] >> (x % WORD)
 }
 
 /// Marks the pixels of a row from column `x` on whose bits are set; they are in one word.

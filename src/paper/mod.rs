@@ -30,7 +30,7 @@ pub(crate) use depth_change::{DepthChanges, between};
 pub(crate) use even_windows::{
     Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, even_window, even_windows,
 };
-pub(crate) use marks::{Marks, WORD, mark, word_of};
+pub(crate) use marks::{Marks, WORD, from as marks_from, mark, word_of};
 pub(crate) use methods::estimate as plain_estimate;
 pub(crate) use planes::{JITTER, Plane, inverse_depth};
 pub(crate) use rect::Rect;

@@ -15,7 +15,7 @@ use crate::memory::{bytes, make_room, refill, resize};
 use crate::options::{Options, Semantics};
 use crate::paper::{
     ALIKE, BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows,
-    JITTER, MIDDLE, MISFIT, NEAR, NEAR_NOISE, NEXT, NO_WINDOW, REACH, WORD, inverse_depth,
+    JITTER, MIDDLE, MISFIT, NEAR, NEAR_NOISE, NEXT, NO_WINDOW, REACH, inverse_depth, marks_from,
     places_at,
 };
 use crate::simd::{Along, Groups, Simd, load_by_fours};
@@ -845,7 +845,7 @@ impl Rows {
             }
             let means = &mut means[line * *length + 1..];
             for x in (0..*width).step_by(S::LANES) {
-                let is_spoilt = S::mask((spoilt[x / WORD] >> (x % WORD)) as u32 & all(S::LANES));
+                let is_spoilt = S::mask(marks_from(spoilt, x) as u32 & all(S::LANES));
                 let [left, own, right] =
                     [x, x + 1, x + 2].map(|column| columns[column..][..S::LANES].as_ptr());
                 let sum = S::add(S::add(S::load(left), S::load(own)), S::load(right));
@@ -961,17 +961,16 @@ unsafe fn four_points<S: Along>(
 #[inline(always)]
 unsafe fn keep<S: Simd>(depths: &mut [f32], marks: &[u64]) {
     let whole = depths.len() / S::LANES * S::LANES;
-    let marks = |x: usize| (marks[x / WORD] >> (x % WORD)) as u32;
     for x in (0..whole).step_by(S::LANES) {
         let depths = depths[x..][..S::LANES].as_mut_ptr();
         // SAFETY: as the caller's; so many elements are there.
         unsafe {
-            let kept = S::mask(marks(x) & all(S::LANES));
+            let kept = S::mask(marks_from(marks, x) as u32 & all(S::LANES));
             S::store(depths, S::select(kept, S::load(depths), S::splat(f32::NAN)));
         }
     }
     for x in whole..depths.len() {
-        depths[x] = if marks(x) & 1 != 0 { depths[x] } else { f32::NAN };
+        depths[x] = if marks_from(marks, x) & 1 != 0 { depths[x] } else { f32::NAN };
     }
 }
 

@@ -5,7 +5,7 @@ use crate::fast::arithmetic::Floats;
 use crate::fast::lanes::LANES;
 use crate::fast::tile::{Bits, all, turned};
 use crate::options::Options;
-use crate::paper::{Cloud, NO_WINDOW, SecondPass, WORD};
+use crate::paper::{Cloud, NO_WINDOW, SecondPass, marks_from};
 use crate::simd::{Along, load_by_fours};
 
 /// A row of pixels, some of which take even windows.
@@ -39,7 +39,7 @@ impl ChosenRow<'_> {
                 lanes |= u32::from(is_chosen) << lane;
             }
             if of_left.is_some() {
-                let concerned = (concerned[x / WORD] >> (x % WORD)) as u32;
+                let concerned = marks_from(concerned, x) as u32;
                 for lane in Bits(concerned & all(S::LANES) & !lanes) {
                     self.write_one(x + lane);
                 }
