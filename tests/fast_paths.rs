@@ -6,7 +6,7 @@ use clouds::{
     Cloud, Kind, ODD, Random, angle, assert_same_bits, compute, compute_listed, edge_options,
     fast_isas, methods, normal, options, paper_options, random_options,
 };
-use iine::{Estimator, Isa, Method, Normals, Options, Points, Semantics};
+use iine::{BorderPolicy, Estimator, Isa, Method, Normals, Options, Points, Semantics};
 
 const SMOOTHING: [f32; 6] = [3.0, 5.0, 7.0, 10.0, 20.0, 40.0];
 
@@ -408,6 +408,37 @@ fn flat_depths_with_zeros_equal_the_plain_form() {
         }
     }
     println!("{worst:?}");
+}
+
+/// Windows that go far beyond the border, or have all of the image.
+#[test]
+fn windows_as_large_as_the_image_equal_the_plain_form() {
+    let mut worst = Worst::default();
+    for seed in 0..450 {
+        let mut random = Random::new(seed);
+        let [width, height] = [(); 2].map(|()| 3 + random.below(30));
+        let kind = Kind::ALL[seed as usize % Kind::ALL.len()];
+        let cloud = Cloud::new(kind, width, height, seed);
+        let size = random.between(2.01, 1.2 * (width + height) as f32);
+        let method = random.pick(&methods().collect::<Vec<_>>());
+        let options = options(method, size, random.below(2) == 0);
+        worst.check(&cloud, &format!("{kind:?} {width}x{height} seed {seed}"), &options);
+    }
+    println!("{worst:?}");
+}
+
+/// And cost no more than others: by walking over them this would take hours.
+#[test]
+fn windows_as_large_as_the_image_are_summed() {
+    let cloud = Cloud::new(Kind::Plane, 640, 480, 0);
+    let small = normal(&compute(&mut Estimator::new(Options::default()), &cloud)[240 * 640 + 320]);
+    for method in [Method::CovarianceMatrix, Method::Average3DGradient] {
+        let options = options((method, BorderPolicy::Mirror), 5000.0, false);
+        for found in compute(&mut Estimator::new(options), &cloud) {
+            let degrees = angle(normal(&found).unwrap(), small.unwrap());
+            assert!(degrees < 0.01, "{method:?}: {degrees} deg");
+        }
+    }
 }
 
 /// What no list of cases would bring together.

@@ -136,7 +136,7 @@ impl TileScratch {
         columns: usize,
         side: usize,
     ) -> Result<(), Error> {
-        let frame = &Frame::largest(columns, side, job.image.width);
+        let frame = &Frame::largest(columns, side, (job.image.width, job.image.height));
         self.planes.reserve(frame)?;
         match job.options.method {
             Method::CovarianceMatrix => self.moments.reserve(frame, side),
@@ -239,7 +239,7 @@ fn compute_slices(
     };
     // Nothing is written if there is no memory for what is known already.
     let columns = job.columns(true, least_reach);
-    let side = Frame::most_of_ring(least_reach - 2).min(width.min(height));
+    let side = Frame::most_of_ring(least_reach - 2).min(width + height);
     for scratch in &each[..workers.count()] {
         let WorkerScratch { windows, sums, .. } = &mut *lock(scratch);
         windows.start(points, options, job.row(job.per_slice))?;
@@ -352,7 +352,7 @@ impl Job<'_> {
         let reach = reach(points, options, own.deepest());
         let around = rows.start.saturating_sub(reach)..(rows.end + reach).min(height);
         let around = windows.swept(around);
-        let side = (own.side as usize).min(width.min(height));
+        let side = own.side as usize;
         let is_depth = options.method == Method::AverageDepthChange;
         let scale = || scale_to_integers(self.spacing, options, around.deepest(), side);
         let scale = is_depth.then(scale).flatten();

@@ -31,7 +31,7 @@ impl Frame {
         Frame { columns, stride, ring: Self::ring(side), rows }
     }
 
-    /// Rows in a ring for windows of up to `side`, with those above and below.
+    /// Rows in a ring for windows of up to `side`, with those above and below. No window is higher than the image.
     pub fn ring(side: usize) -> usize {
         (side + 2).next_power_of_two()
     }
@@ -53,12 +53,12 @@ impl Frame {
         let right = (columns.end + after + 1).min(width);
         let top = rows.start.saturating_sub(before);
         let bottom = (rows.end + after).min(height);
-        Frame::new(left..right, top..bottom, side)
+        Frame::new(left..right, top..bottom, side.min(height))
     }
 
     /// As large as any that [`Frame::around`] gives for tiles of so many columns.
-    pub fn largest(columns: usize, side: usize, width: usize) -> Self {
-        Frame::new(0..(GROUP + columns + side + 2).min(width), 0..0, side)
+    pub fn largest(columns: usize, side: usize, (width, height): (usize, usize)) -> Self {
+        Frame::new(0..(GROUP + columns + side + 2).min(width), 0..0, side.min(height))
     }
 
     /// Steps of so many lanes that go over the columns and a group behind them.

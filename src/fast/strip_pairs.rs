@@ -106,7 +106,8 @@ impl StripPairs {
         side: usize,
     ) -> Both<f32> {
         let half = (side / 2) as isize;
-        let mut sums = [0_i32; GROUP];
+        // Those of each rectangle fit, those of all might not.
+        let mut sums = [0_i64; GROUP];
         for rect in image.rects((x as isize - half, y as isize - half), (side, side)) {
             let inside = rect.inside_frame(image);
             if inside.x.is_empty() || inside.y.is_empty() {
@@ -117,7 +118,7 @@ impl StripPairs {
             let ((a, b), (c, d)) = (row(inside.y.start), row(inside.y.end));
             for i in 0..GROUP {
                 let between = d[i].wrapping_sub(c[i]).wrapping_sub(b[i].wrapping_sub(a[i]));
-                sums[i] = sums[i].wrapping_add(between);
+                sums[i] += i64::from(between);
             }
         }
         sums.map(|sum| sum as f32)

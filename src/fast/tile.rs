@@ -14,7 +14,7 @@ use crate::Error;
 use crate::cloud::Points;
 use crate::depth_change::is_depth_change;
 use crate::methods::{Estimate, estimate};
-use crate::options::{BorderPolicy, Options};
+use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
 use crate::simd::{GROUP, Groups, Simd};
 use crate::window::Image;
@@ -294,7 +294,7 @@ impl Tile<'_> {
         Ok(())
     }
 
-    /// The largest side of a window in the tile that fits the image.
+    /// The largest side of a window in the tile.
     ///
     /// # Safety
     /// As [`Tile::compute`].
@@ -315,8 +315,7 @@ impl Tile<'_> {
             }
             let mut lanes = [0.0; GROUP];
             S::store(lanes.as_mut_ptr(), largest);
-            let largest = lanes.into_iter().fold(0.0, f32::max) as usize;
-            largest.min(self.image.width.min(self.image.height))
+            lanes.into_iter().fold(0.0, f32::max) as usize
         }
     }
 
@@ -526,15 +525,13 @@ impl Tile<'_> {
         })
     }
 
-    /// Whether a mirrored window, and the pixels around it, certainly hold finite points without a depth change only.
+    /// Whether a window that crosses the border of the image, and the pixels around it, certainly hold finite points
+    /// without a depth change only.
     ///
     /// Distances are too large in the image's outermost rows and columns, where only one of the passes works;
     /// there, the next pixel inwards must have as large a window. The last pixel of all is in no depth change map.
     pub fn has_only_finite(&self, (x, y): (usize, usize), side: usize) -> bool {
-        let Image { width, height, border_policy } = *self.image;
-        if border_policy != BorderPolicy::Mirror || side > width.min(height) {
-            return false;
-        }
+        let Image { width, height, .. } = *self.image;
         let inner = (x.clamp(1, width - 2), y.clamp(1, height - 2));
         let reach = side / 2 + 1;
         let reaches_last = width - 1 <= x + reach && height - 1 <= y + reach;
