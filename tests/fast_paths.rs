@@ -410,6 +410,28 @@ fn flat_depths_with_zeros_equal_the_plain_form() {
     println!("{worst:?}");
 }
 
+/// Blocks of one point, as a sensor may write it for "no return", and of points that lack a coordinate.
+#[test]
+fn blocks_of_one_point_equal_the_plain_form() {
+    let mut worst = Worst::default();
+    let odd = [[0.0; 3], [0.3, 0.2, 1.0], [0.3, 0.2, 9.0], [f32::NAN, 0.2, 1.2]];
+    for seed in 0..60 {
+        let mut random = Random::new(seed);
+        let (width, height) = (30 + random.below(60), 30 + random.below(40));
+        let mut cloud = Cloud::new(Kind::Wavy, width, height, seed);
+        for _ in 0..4 {
+            let point = random.pick(&odd);
+            let [left, top] = [width, height].map(|end| random.below(end));
+            let [columns, rows] = [(); 2].map(|()| 1 + random.below(60));
+            cloud.fill(left..left + columns, top..top + rows, point);
+        }
+        for _ in 0..3 {
+            worst.check(&cloud, &format!("seed {seed}"), &random_options(&mut random));
+        }
+    }
+    println!("{worst:?}");
+}
+
 /// Windows that go far beyond the border, or have all of the image.
 #[test]
 fn windows_as_large_as_the_image_equal_the_plain_form() {

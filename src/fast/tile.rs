@@ -267,9 +267,10 @@ impl Tile<'_> {
     ) -> Result<(), BeyondLimit> {
         let (points, whole_points, held) = (self.points, self.whole_points, layer.held);
         let mut run = Run::default();
-        let after = side.div_ceil(2);
+        let (before, after) = (side / 2 + 1, side.div_ceil(2));
         let mut next = frame.rows.start;
-        let mut hidden = false;
+        // The rows behind the last one with a hidden point, and what windows reach.
+        let mut hidden_end = 0;
         for y in self.rows.clone() {
             while next < (y + after + 1).min(self.image.height) {
                 // SAFETY: as the caller's.
@@ -279,13 +280,14 @@ impl Tile<'_> {
                 if news.largest > limit {
                     return Err(BeyondLimit);
                 }
-                hidden |= news.hidden;
+                hidden_end = if news.hidden { next + before + 1 } else { hidden_end };
                 // SAFETY: as the caller's.
                 unsafe { sums.push::<S>(frame, planes, next) };
                 next += 1;
             }
             sums.aim(frame, y, side);
             let inner = self.inner(side, y);
+            let hidden = y < hidden_end;
             // SAFETY: as the caller's.
             unsafe {
                 self.row::<S, M>(frame, planes, sums, sink, &mut run, y, &inner, layer, hidden);
@@ -668,7 +670,7 @@ pub(crate) struct Bits(pub u32);
 
 impl Bits {
     /// The mask of those of which this is so.
-    fn which(self, is_so: impl Fn(usize) -> bool) -> u32 {
+    pub fn which(self, is_so: impl Fn(usize) -> bool) -> u32 {
         self.filter(|lane| is_so(*lane)).fold(0, |lanes, lane| lanes | 1 << lane)
     }
 }

@@ -238,7 +238,8 @@ impl Cloud {
         }
     }
 
-    fn fill(
+    /// Makes all points of some columns and rows, as far as they are inside, this one.
+    pub fn fill(
         &mut self,
         columns: std::ops::Range<usize>,
         rows: std::ops::Range<usize>,

@@ -259,7 +259,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         unsafe {
             sums.solve::<S>(0, lanes);
             for (pair, x) in (*start..end).step_by(LANES * step).enumerate() {
-                let (at, windows) = (pair * LANES, lanes[pair]);
+                let (at, mut windows) = (pair * LANES, lanes[pair]);
                 let count = (end - x).div_ceil(step).min(LANES);
                 let written = if is_later { windows } else { all(count) & !left_out[pair] };
                 let place = (x / step, y / step);
@@ -273,6 +273,10 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                     |lane: usize| window(pixel(lane), radii[at + lane] as usize, width, height);
                 let mut found = M::estimate::<S::Pair>(sums, at, error);
                 let mut plain = found.doubtful & windows;
+                if plain != 0 {
+                    let of_one_point = of_one_point(&cleaned, rect, plain);
+                    (windows, plain) = (windows & !of_one_point, plain & !of_one_point);
+                }
                 if plain != 0 && M::afresh::<S>(&cleaned, rect, plain, sums, at) {
                     sums.solve::<S>(at, &[plain]);
                     let fresh = M::estimate::<S::Pair>(sums, at, 0.0);
@@ -297,6 +301,26 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let normal = turn_to_viewpoint(found.normal, points.at(x, y), self.options.viewpoint);
         Estimate { normal, ..found }
     }
+}
+
+/// The lanes, of some, whose windows hold the same point again and again, as a sensor may write it for "no return": they
+/// have no normal.
+#[cold]
+fn of_one_point(points: &Cleaned, rect: impl Fn(usize) -> Rect, lanes: u32) -> u32 {
+    let are_alike = |rect: &Rect| {
+        let mut points = points.finite(rect);
+        let first = points.next();
+        points.all(|point| Some(point) == first)
+    };
+    let ends =
+        |all: Range<usize>, own: Range<usize>| all.start.min(own.start)..all.end.max(own.end);
+    let all = Bits(lanes)
+        .map(&rect)
+        .reduce(|all, own| Rect { x: ends(all.x, own.x), y: ends(all.y, own.y) });
+    if all.is_some_and(|all| are_alike(&all)) {
+        return lanes;
+    }
+    Bits(lanes).which(|lane| are_alike(&rect(lane)))
 }
 
 /// The lanes of eight windows, of some, that hold hidden points.
