@@ -670,7 +670,7 @@ pub(crate) struct Bits(pub u32);
 
 impl Bits {
     /// The mask of those of which this is so.
-    pub fn which(self, is_so: impl Fn(usize) -> bool) -> u32 {
+    fn which(self, is_so: impl Fn(usize) -> bool) -> u32 {
         self.filter(|lane| is_so(*lane)).fold(0, |lanes, lane| lanes | 1 << lane)
     }
 }

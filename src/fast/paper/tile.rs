@@ -17,7 +17,7 @@ use crate::methods::Estimate;
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
 use crate::paper::{CleanPoints, Cleaned, Rect, middle, plain_estimate, window};
-use crate::simd::{GROUP, Groups};
+use crate::simd::{Along, GROUP, Groups};
 
 /// A rectangle of the image whose normals are computed together.
 #[derive(Clone)]
@@ -274,7 +274,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 let mut found = M::estimate::<S::Pair>(sums, at, error);
                 let mut plain = found.doubtful & windows;
                 if plain != 0 {
-                    let of_one_point = of_one_point(&cleaned, rect, plain);
+                    let of_one_point = self.of_one_point::<S::Widest>(pixel, rect, plain);
                     (windows, plain) = (windows & !of_one_point, plain & !of_one_point);
                 }
                 if plain != 0 && M::afresh::<S>(&cleaned, rect, plain, sums, at) {
@@ -294,6 +294,64 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         }
     }
 
+    /// The lanes, of some, whose windows hold the same point again and again, as a sensor may write it for "no return": they
+    /// have no normal.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn of_one_point<S: Along>(
+        &self,
+        pixel: impl Fn(usize) -> (usize, usize),
+        rect: impl Fn(usize) -> Rect,
+        lanes: u32,
+    ) -> u32 {
+        let first = lanes.trailing_zeros() as usize;
+        let (x, y) = pixel(first);
+        let point = self.points.at(x, y);
+        let hull = |a: Range<usize>, b: Range<usize>| a.start.min(b.start)..a.end.max(b.end);
+        let all = Bits(lanes).map(&rect);
+        let all = all.fold(rect(first), |a, b| Rect { x: hull(a.x, b.x), y: hull(a.y, b.y) });
+        let mut alike = 0;
+        // SAFETY: as the caller's.
+        unsafe {
+            if self.holds_only::<S>(&all, point) {
+                return lanes;
+            }
+            for lane in Bits(lanes) {
+                alike |= u32::from(self.holds_only::<S>(&rect(lane), point)) << lane;
+            }
+        }
+        alike
+    }
+
+    /// Whether a rectangle holds this point only, and some that are NaN.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn holds_only<S: Along>(&self, rect: &Rect, point: [f32; 3]) -> bool {
+        let Rect { x: columns, y: rows } = rect;
+        for row in rows.clone() {
+            let row = self.points.row(row, columns.clone(), self.whole_points);
+            // SAFETY: as the caller's.
+            unsafe {
+                let [x, y, z] = [S::splat(point[0]), S::splat(point[1]), S::splat(point[2])];
+                let mut others = S::splat(0.0);
+                for at in row.starts::<S>() {
+                    let [px, py, pz] = row.lanes::<S>(at);
+                    let there = S::and(S::and(S::eq(px, px), S::eq(py, py)), S::eq(pz, pz));
+                    let alike = S::and(S::and(S::eq(px, x), S::eq(py, y)), S::eq(pz, z));
+                    others = S::or(others, S::and_not(alike, there));
+                }
+                if S::bits(others) != 0 {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+
     /// The plain form of one pixel.
     #[cold]
     fn plain(&self, points: &Cleaned, (x, y): (usize, usize), rect: &Rect) -> Estimate {
@@ -301,26 +359,6 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let normal = turn_to_viewpoint(found.normal, points.at(x, y), self.options.viewpoint);
         Estimate { normal, ..found }
     }
-}
-
-/// The lanes, of some, whose windows hold the same point again and again, as a sensor may write it for "no return": they
-/// have no normal.
-#[cold]
-fn of_one_point(points: &Cleaned, rect: impl Fn(usize) -> Rect, lanes: u32) -> u32 {
-    let are_alike = |rect: &Rect| {
-        let mut points = points.finite(rect);
-        let first = points.next();
-        points.all(|point| Some(point) == first)
-    };
-    let ends =
-        |all: Range<usize>, own: Range<usize>| all.start.min(own.start)..all.end.max(own.end);
-    let all = Bits(lanes)
-        .map(&rect)
-        .reduce(|all, own| Rect { x: ends(all.x, own.x), y: ends(all.y, own.y) });
-    if all.is_some_and(|all| are_alike(&all)) {
-        return lanes;
-    }
-    Bits(lanes).which(|lane| are_alike(&rect(lane)))
 }
 
 /// The lanes of eight windows, of some, that hold hidden points.
