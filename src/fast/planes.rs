@@ -26,12 +26,13 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
+    /// For windows of up to `side`, or of the image's height if that is less: no more of their rows are held.
     fn new(columns: Range<usize>, rows: Range<usize>, side: usize) -> Self {
         let stride = (columns.len() + 2 * MARGIN).next_multiple_of(LANES) + MARGIN;
         Frame { columns, stride, ring: Self::ring(side), rows }
     }
 
-    /// Rows in a ring for windows of up to `side`, with those above and below. No window is higher than the image.
+    /// Rows in a ring for windows of up to `side`, with those above and below.
     pub fn ring(side: usize) -> usize {
         (side + 2).next_power_of_two()
     }
