@@ -280,7 +280,9 @@ impl Tile<'_> {
                 if news.largest > limit {
                     return Err(BeyondLimit);
                 }
-                hidden_end = if news.hidden { next + before + 1 } else { hidden_end };
+                if news.hidden {
+                    hidden_end = next + before + 1;
+                }
                 // SAFETY: as the caller's.
                 unsafe { sums.push::<S>(frame, planes, next) };
                 next += 1;

@@ -220,10 +220,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
                     if self.even.normals.is_some() && found != 0 {
                         let at = group * GROUP;
                         run.lanes[at / LANES] |= found << (at % LANES);
-                        let x = rings.of_pixels(&points, 0, &pixels);
-                        let y = rings.of_pixels(&points, 1, &pixels);
-                        let z = rings.of_pixels(&points, 2, &pixels);
-                        run.points.store::<S>(at, [x, y, z]);
+                        run.points.store::<S>(at, rings.points_of(&points, &pixels));
                     }
                 }
             }

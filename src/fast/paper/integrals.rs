@@ -270,6 +270,21 @@ impl<const N: usize> Rings<N> {
         unsafe { Floats::load(eight.as_ptr()) }
     }
 
+    /// x, y and z of eight pixels' points, as [`Rings::of_pixels`].
+    ///
+    /// # Safety
+    /// As there.
+    #[inline(always)]
+    pub unsafe fn points_of<S: Groups>(&self, row: &Around, pixels: &Pixels) -> [Floats<S>; 3] {
+        // SAFETY: as the caller's.
+        unsafe {
+            let x = self.of_pixels(row, 0, pixels);
+            let y = self.of_pixels(row, 1, pixels);
+            let z = self.of_pixels(row, 2, pixels);
+            [x, y, z]
+        }
+    }
+
     /// Aims at the windows around the pixels of row `y` in an image of this height.
     pub fn aim(&mut self, y: usize, height: usize) {
         self.aimed = Aimed { y, height, first: y - y % self.rows };

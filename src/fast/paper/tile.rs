@@ -220,10 +220,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                         run.lanes[pair] &= !(lanes << shift);
                     }
                     M::note::<S>(&sums, &rects, rings, windows, &mut run.sums, at);
-                    let x = rings.of_pixels(&points, 0, &pixels);
-                    let y = rings.of_pixels(&points, 1, &pixels);
-                    let z = rings.of_pixels(&points, 2, &pixels);
-                    run.points.store::<S>(at, [x, y, z]);
+                    run.points.store::<S>(at, rings.points_of(&points, &pixels));
                 }
             }
             if PARTIAL {
