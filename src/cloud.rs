@@ -274,10 +274,8 @@ impl<'a> Points<'a> {
     #[inline(always)]
     pub(crate) fn prefetch(&self, y: usize, x: usize, count: usize) {
         if y < self.grid.height {
-            prefetch(
-                self.z.wrapping_byte_add(self.grid.offset(x, y)),
-                count * self.grid.point_stride,
-            );
+            let first = self.z.wrapping_byte_add(self.grid.offset(x, y));
+            prefetch(first, count, self.grid.point_stride);
         }
     }
 
@@ -340,7 +338,7 @@ impl PointRow<'_> {
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     pub unsafe fn lanes<S: Along>(&self, at: usize) -> [S::F; 3] {
-        prefetch(self.first.wrapping_byte_add(self.below + at * self.step), S::LANES * self.step);
+        prefetch(self.first.wrapping_byte_add(self.below + at * self.step), S::LANES, self.step);
         // SAFETY: as the caller's; the points are inside the row, and of those that are read whole none is the last.
         unsafe {
             if at + S::LANES <= self.whole {
@@ -535,17 +533,23 @@ impl<'a> Normals<'a> {
     }
 }
 
-/// Asks for the cache lines of so many bytes.
+/// Asks for the cache lines of so many points, which are `step` bytes apart.
 #[inline(always)]
-pub(crate) fn prefetch(at: *const f32, bytes: usize) {
+pub(crate) fn prefetch(first: *const f32, count: usize, step: usize) {
     #[cfg(target_arch = "x86_64")]
-    for line in (0..bytes).step_by(LINE) {
+    {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         // SAFETY: a prefetch reads and writes nothing, whatever the address.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(at.wrapping_byte_add(line).cast()) };
+        let ask = |at| unsafe { _mm_prefetch::<_MM_HINT_T0>(first.wrapping_byte_add(at).cast()) };
+        if step == LINE / 4 {
+            // No loop where the count is known.
+            (0..count.div_ceil(4)).for_each(|line| ask(line * LINE));
+        } else {
+            (0..count * step).step_by(LINE).for_each(ask);
+        }
     }
     #[cfg(not(target_arch = "x86_64"))]
-    let _ = (at, bytes);
+    let _ = (first, count, step);
 }
 
 /// Asks for the cache lines of so many pixels, which will be written: normals are so far apart that stores would wait for

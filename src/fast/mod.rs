@@ -225,7 +225,7 @@ fn compute_slices(
     let (width, height) = (points.width(), points.height());
     let strips = strips(width, height);
     let least_reach = reach(points, options, 0.0);
-    let slice_rows = SLICE_REACHES * least_reach.max(*last_reach);
+    let expected = least_reach.max(*last_reach);
     let is_depth = options.method == Method::AverageDepthChange;
     let job = Job {
         isa,
@@ -235,14 +235,14 @@ fn compute_slices(
         whole_points: output.is_some_and(|(_, normals)| points.has_whole_points(normals)),
         spacing: if is_depth { spacing(points) } else { 0.0 },
         strips,
-        per_slice: slice_rows.div_ceil(height / strips).min(strips),
+        per_slice: (SLICE_REACHES * expected).div_ceil(height / strips).min(strips),
     };
     // Nothing is written if there is no memory for what is known already.
     let columns = job.columns(true, least_reach);
     let side = Frame::most_of_ring(least_reach - 2).min(width + height);
     for scratch in &each[..workers.count()] {
         let WorkerScratch { windows, sums, .. } = &mut *lock(scratch);
-        windows.start(points, options, job.row(job.per_slice))?;
+        windows.start(points, options, job.row(job.per_slice), expected)?;
         if output.is_some() {
             sums.reserve(&job, true, columns, side)?;
         }

@@ -490,7 +490,7 @@ impl Group<'_> {
         let &Cloud { width, height, .. } = even.cloud;
         for y in row * BLOCK..(row * BLOCK + BLOCK).min(height) {
             for block in blocks {
-                prefetch(even.cloud.points[y * width + block * BLOCK].as_ptr(), 1);
+                prefetch(even.cloud.points[y * width + block * BLOCK].as_ptr(), 1, 1);
             }
         }
     }
