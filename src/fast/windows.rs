@@ -738,8 +738,8 @@ mod tests {
 
     type S = Twice<Portable>;
 
-    /// Depths with steps and holes, the same for the same seed.
-    fn depths(width: usize, height: usize, seed: u32) -> Vec<f32> {
+    /// Depths with steps and holes, three in so many `pixels`, the same for the same seed.
+    fn depths(width: usize, height: usize, pixels: u32, seed: u32) -> Vec<f32> {
         let mut state = seed.wrapping_mul(2_654_435_761) | 1;
         let mut random = move || {
             state ^= state << 13;
@@ -748,7 +748,7 @@ mod tests {
             state
         };
         (0..width * height)
-            .map(|_| match random() % 97 {
+            .map(|_| match random() % pixels {
                 0 => f32::NAN,
                 1 => 3.0,
                 2 => f32::INFINITY,
@@ -760,11 +760,12 @@ mod tests {
     #[test]
     fn the_sweeps_equal_the_plain_maps() {
         for width in (3..70).chain([640, 1024]) {
-            for (height, seed) in [(3, 1), (4, 2), (23, 3), (50, 4)] {
-                let z = depths(width, height, seed * 1000 + width as u32);
+            let cases = [(3, 1, 97), (4, 2, 97), (23, 3, 97), (50, 4, 97), (40, 5, 2003)];
+            for (height, seed, pixels) in cases {
+                let z = depths(width, height, pixels, seed * 1000 + width as u32);
                 let points = Points::planes([&z, &z, &z], width, height, 0).unwrap();
                 let options = Options {
-                    // With the last, depths decide.
+                    // With the fourth, depths decide.
                     normal_smoothing_size: if seed == 4 { 9.8 } else { 9.5 },
                     border_policy: crate::BorderPolicy::Mirror,
                     depth_dependent_smoothing: seed % 2 == 0,
