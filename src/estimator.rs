@@ -561,7 +561,6 @@ impl<'a> Plain<'a> {
             let side = self.window_side(x, y) as usize;
             let first = (start(x, side), start(y, side));
             let rects = self.image.rects(first, (side, side));
-            let rects = rects.filter(|rect| !rect.x.is_empty() && !rect.y.is_empty());
             (side > 0).then(|| rects.map(|rect| paper::Rect { x: rect.x, y: rect.y }))
         };
         let Image { width, height, .. } = self.image;

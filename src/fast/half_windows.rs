@@ -157,9 +157,6 @@ impl<T: Depth> HalfWindows<T> {
         let mean = |start: (isize, isize)| {
             let (mut sum, mut count) = (T::default(), 0_i32);
             for rect in image.rects(start, (half, half)) {
-                if rect.x.is_empty() || rect.y.is_empty() {
-                    continue;
-                }
                 let of_rect = self.sum(frame, &rect);
                 sum = if rect.sign > 0 { sum.plus(of_rect) } else { sum.minus(of_rect) };
                 count += rect.sign * (rect.x.len() * rect.y.len()) as i32;

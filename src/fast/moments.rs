@@ -199,9 +199,6 @@ impl Moments {
         (*most, *z) = ([0.0; GROUP], 0.0);
         let mut count = 0;
         for rect in image.rects((x as isize - half, y as isize - half), (side, side)) {
-            if rect.x.is_empty() || rect.y.is_empty() {
-                continue;
-            }
             count += rect.x.len() * rect.y.len();
             for (sign, end_row) in [(1.0, rect.y.end), (-1.0, rect.y.start)] {
                 if end_row == 0 {
