@@ -34,15 +34,15 @@ use Semantics::{Paper, Pcl};
 /// Instructions a pixel at most: with AVX2, with SSE2. The paper has no border policies.
 const BOUNDS: [(Semantics, Method, BorderPolicy, u64, u64); 10] = [
     (Pcl, CovarianceMatrix, Ignore, 191, 391),
-    (Pcl, CovarianceMatrix, Mirror, 233, 441),
+    (Pcl, CovarianceMatrix, Mirror, 229, 439),
     (Pcl, Average3DGradient, Ignore, 105, 189),
-    (Pcl, Average3DGradient, Mirror, 136, 227),
-    (Pcl, AverageDepthChange, Ignore, 101, 176),
-    (Pcl, AverageDepthChange, Mirror, 199, 282),
-    (Pcl, Simple3DGradient, Ignore, 114, 205),
-    (Paper, CovarianceMatrix, Ignore, 236, 469),
-    (Paper, Average3DGradient, Ignore, 167, 318),
-    (Paper, AverageDepthChange, Ignore, 176, 312),
+    (Pcl, Average3DGradient, Mirror, 133, 227),
+    (Pcl, AverageDepthChange, Ignore, 94, 172),
+    (Pcl, AverageDepthChange, Mirror, 194, 278),
+    (Pcl, Simple3DGradient, Ignore, 107, 197),
+    (Paper, CovarianceMatrix, Ignore, 230, 469),
+    (Paper, Average3DGradient, Ignore, 163, 314),
+    (Paper, AverageDepthChange, Ignore, 174, 308),
 ];
 
 /// In metres: how far the cloud is moved, and the depth of the far plane.
