@@ -32,8 +32,6 @@ pub(crate) struct Windows {
     down: usize,
     /// The row after the slice; none before the first.
     after: Option<usize>,
-    /// Distances below this are those of the plain form; others are not below it.
-    exact: usize,
 }
 
 /// What the sweeps found in a row, or in several.
@@ -94,7 +92,7 @@ impl Windows {
         self.held.grow(reach.min(height) * length)?;
         resize(&mut self.swept, height, Swept::NOTHING)?;
         self.after = None;
-        self.exact = expected + EXACT_BEYOND;
+        self.sweep.exact = expected + EXACT_BEYOND;
         Ok(())
     }
 
@@ -124,16 +122,14 @@ impl Windows {
                 let mut rows = WindowRows::new(points.width(), self.first, &mut self.map);
                 let (down, swept) = (self.down..end, &mut self.swept);
                 // SAFETY: as the caller's.
-                unsafe {
-                    rows.sweep_down::<S>(points, options, down, self.exact, &mut self.sweep, swept)
-                };
+                unsafe { rows.sweep_down::<S>(points, options, down, &mut self.sweep, swept) };
                 self.down = end;
             }
             let reach = reach(points, options, self.swept(slice.clone()).deepest());
             end = (slice.end + reach).min(height);
             let start = slice.start.saturating_sub(reach);
-            if start < self.start || reach > self.exact {
-                self.exact = self.exact.max(reach + EXACT_BEYOND);
+            if start < self.start || reach > self.sweep.exact {
+                self.sweep.exact = self.sweep.exact.max(reach + EXACT_BEYOND);
                 self.restart(start.min(self.start));
             } else if end <= self.down {
                 break;
@@ -146,9 +142,7 @@ impl Windows {
         let mut rows = WindowRows::new(points.width(), self.first, &mut self.map);
         let (up, swept) = (slice.start..self.down, &mut self.swept);
         // SAFETY: as the caller's.
-        unsafe {
-            rows.sweep_up::<S>(points, options, up, slice.end, self.exact, &mut self.sweep, swept)
-        };
+        unsafe { rows.sweep_up::<S>(points, options, up, slice.end, &mut self.sweep, swept) };
         Ok(())
     }
 
@@ -208,6 +202,8 @@ struct Sweep {
     tested: Buffer<Lanes>,
     above: Buffer<Lanes>,
     sides: Buffer<Lanes>,
+    /// Distances below this are those of the plain form; others are not below it.
+    exact: usize,
 }
 
 impl Sweep {
@@ -290,7 +286,6 @@ impl<'a> WindowRows<'a> {
         points: &Points,
         options: &Options,
         rows: Range<usize>,
-        exact: usize,
         sweep: &mut Sweep,
         swept: &mut [Swept],
     ) {
@@ -322,7 +317,7 @@ impl<'a> WindowRows<'a> {
             if y > self.first {
                 let (above, row) = self.two_rows(y - 1);
                 // SAFETY: as the caller's.
-                unsafe { forward::<S>(order, above, row, exact as f32) };
+                unsafe { forward::<S>(order, above, row, sweep.exact as f32) };
             }
             close_ends(self.row(y.max(rows.start)), far);
         }
@@ -340,7 +335,6 @@ impl<'a> WindowRows<'a> {
         options: &Options,
         rows: Range<usize>,
         end: usize,
-        exact: usize,
         sweep: &mut Sweep,
         swept: &mut [Swept],
     ) {
@@ -352,7 +346,7 @@ impl<'a> WindowRows<'a> {
             if y > rows.start {
                 let (row, below) = self.two_rows(y - 1);
                 // SAFETY: as the caller's.
-                unsafe { backward::<S>(order, row, below, far, exact as f32) };
+                unsafe { backward::<S>(order, row, below, far, sweep.exact as f32) };
                 close_ends(row, far);
             }
             if y < end {
@@ -691,7 +685,7 @@ unsafe fn backward<S: Simd>(
 }
 
 /// Goes on with the step along the row from the ends of segments, each of which is in the lane of the next one, through
-/// these, as far as it is nearer.
+/// these, as far as it is nearer and below `exact`.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.

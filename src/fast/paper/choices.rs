@@ -3,6 +3,7 @@
 //! for a pixel of each at a time.
 
 use std::iter::repeat_n;
+use std::mem::MaybeUninit;
 
 use super::windows::least_depth_change;
 use crate::Error;
@@ -273,18 +274,6 @@ impl<S: Simd> Windows<S> {
 }
 
 impl<S: Simd> Pixels<S> {
-    /// None that takes a window.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    unsafe fn none() -> Self {
-        // SAFETY: as the caller's.
-        let [number, there, inverse_depth, tolerance, points] = [unsafe { Floats::splat(0.0) }; 5];
-        let near = Near { inverse_depth, points };
-        Pixels { number, at: [number; 2], there, ray: [number; 3], inverse_depth, tolerance, near }
-    }
-
     /// Takes the others of a mask.
     #[inline(always)]
     fn take(&mut self, mask: S::F, other: &Self) {
@@ -872,11 +861,12 @@ impl Rows {
         let &EvenWindows { cloud, options, .. } = even;
         let (width, height) = (cloud.width, cloud.height);
         assert!(columns.iter().all(|column| *column < width) && width + BLOCK < self.length);
-        // SAFETY: as the caller's; there are so many elements and points from every column on.
+        // SAFETY: as the caller's; there are so many elements and points from every column on, and all pixels are written.
         unsafe {
             let there = S::mask((1 << blocks) - 1);
             let (none, one) = (S::splat(f32::NAN), S::splat(1.0));
-            let mut pixels = [Pixels::none(); BLOCK * BLOCK];
+            let mut pixels = MaybeUninit::<[Pixels<S>; BLOCK * BLOCK]>::uninit();
+            let to = pixels.as_mut_ptr().cast::<Pixels<S>>();
             for line in 0..BLOCK {
                 let depths = self.four::<S>(&self.depths, line, columns);
                 let inverse_depths = self.four::<S>(&self.inverse_depths, line + 1, columns);
@@ -896,7 +886,7 @@ impl Rows {
                     let [x, y, z] = points[column];
                     let z = if cloud.has_range { z * inverse_depth } else { Floats(one) };
                     let number = line * BLOCK + column;
-                    pixels[number] = Pixels {
+                    to.add(number).write(Pixels {
                         number: Floats::splat(number as f32),
                         at: [from_middle(column), from_middle(line)],
                         there: Floats(S::eq(depth, depth)),
@@ -904,10 +894,10 @@ impl Rows {
                         inverse_depth,
                         tolerance: tolerance::<S>(depth, options),
                         near,
-                    };
+                    });
                 }
             }
-            pixels
+            pixels.assume_init()
         }
     }
 

@@ -30,14 +30,16 @@ impl ChosenRow<'_> {
         let (first, of_even) = (y * cloud.width, second_pass.of_even());
         let choices = &second_pass.choices()[first..][..cloud.width];
         let concerned = second_pass.concerned().row(y);
+        const { assert!(f32::from_bits(NO_WINDOW).is_nan()) };
         let whole = cloud.width / S::LANES * S::LANES;
         for x in (0..whole).step_by(S::LANES) {
-            let (mut places, mut lanes) = ([0; LANES], 0);
-            for (lane, choice) in choices[x..][..S::LANES].iter().enumerate() {
-                let is_chosen = *choice != NO_WINDOW;
-                places[lane] = if is_chosen { *choice as usize } else { 0 };
-                lanes |= u32::from(is_chosen) << lane;
-            }
+            let choices = &choices[x..][..S::LANES];
+            // As a float `NO_WINDOW` is NaN, and no place is.
+            // SAFETY: as the caller's; there are so many choices.
+            let lanes = unsafe {
+                let choices = S::load(choices.as_ptr().cast());
+                S::bits(S::eq(choices, choices))
+            };
             if of_left.is_some() {
                 let concerned = marks_from(concerned, x) as u32;
                 for lane in Bits(concerned & all(S::LANES) & !lanes) {
@@ -49,8 +51,10 @@ impl ChosenRow<'_> {
             }
             // SAFETY: as the caller's; an estimate is four floats, and so many points are there.
             unsafe {
+                // Lanes without a window have any one's.
+                let place = |lane: usize| (choices[lane] as usize).min(of_even.len() - 1);
                 let [nx, ny, nz, curvature] =
-                    load_by_fours::<S>(|lane| of_even[places[lane]].as_ptr());
+                    load_by_fours::<S>(|lane| of_even[place(lane)].as_ptr());
                 // Read by fours of floats.
                 let points = cloud.points[first + x..][..=S::LANES].as_ptr().cast();
                 let [px, py, pz] = S::load_points(points, size_of::<[f32; 3]>());
