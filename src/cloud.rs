@@ -545,7 +545,8 @@ pub(crate) fn prefetch(first: *const f32, count: usize, step: usize) {
             // No loop where the count is known.
             (0..count.div_ceil(4)).for_each(|line| ask(line * LINE));
         } else {
-            (0..count * step).step_by(LINE).for_each(ask);
+            // Of points that are larger than a line, the lines that the coordinates asked for are in.
+            (0..count * step).step_by(LINE.max(step)).for_each(ask);
         }
     }
     #[cfg(not(target_arch = "x86_64"))]

@@ -37,8 +37,8 @@ pub(crate) struct Image {
 }
 
 impl Image {
-    /// The rectangles that make up a window which may cross the border, none empty; a pixel in two of them counts twice, and
-    /// one in a rectangle of negative sign is taken away.
+    /// The rectangles that make up a window which may cross the border, none empty; a pixel in two of them counts
+    /// twice, and one in a rectangle of negative sign is taken away.
     ///
     /// With [`BorderPolicy::Ignore`] the window is clipped (PCL reads out of bounds there).
     pub fn rects(
