@@ -533,7 +533,8 @@ impl<'a> Normals<'a> {
     }
 }
 
-/// Asks for the cache lines of so many points, which are `step` bytes apart.
+/// Asks for the cache lines of so many points, which are `step` bytes apart: of points larger than a line, for those that
+/// they start in.
 #[inline(always)]
 pub(crate) fn prefetch(first: *const f32, count: usize, step: usize) {
     #[cfg(target_arch = "x86_64")]
@@ -542,11 +543,14 @@ pub(crate) fn prefetch(first: *const f32, count: usize, step: usize) {
         // SAFETY: a prefetch reads and writes nothing, whatever the address.
         let ask = |at| unsafe { _mm_prefetch::<_MM_HINT_T0>(first.wrapping_byte_add(at).cast()) };
         if step == LINE / 4 {
-            // No loop where the count is known.
+            // As below, but without a loop where the count is known.
             (0..count.div_ceil(4)).for_each(|line| ask(line * LINE));
         } else {
-            // Of points that are larger than a line, the lines that the coordinates asked for are in.
-            (0..count * step).step_by(LINE.max(step)).for_each(ask);
+            let mut at = 0;
+            while at < count * step {
+                ask(at);
+                at += LINE.max(step);
+            }
         }
     }
     #[cfg(not(target_arch = "x86_64"))]

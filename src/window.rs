@@ -51,8 +51,8 @@ impl Image {
         // One by one: most are empty.
         (0..4).filter_map(move |k| {
             let ((x, along), (y, down)) = (&columns[k % 2], &rows[k / 2]);
-            let rect = || Rect { x: x.clone(), y: y.clone(), sign: along * down };
-            (!x.is_empty() && !y.is_empty()).then(rect)
+            let is_empty = x.is_empty() || y.is_empty();
+            (!is_empty).then(|| Rect { x: x.clone(), y: y.clone(), sign: along * down })
         })
     }
 
@@ -80,7 +80,7 @@ fn fold(start: isize, size: usize, limit: usize, policy: BorderPolicy) -> [Range
     let end = start + size as isize;
     let last = limit as isize - 1;
     let clip = |start: isize, end: isize| {
-        start.max(0).min(limit as isize) as usize..end.max(0).min(limit as isize) as usize
+        start.clamp(0, limit as isize) as usize..end.clamp(0, limit as isize) as usize
     };
     match policy {
         BorderPolicy::Mirror if start < 0 => [clip(0, end), clip(0, -start)],

@@ -65,7 +65,7 @@ impl Swept {
     }
 }
 
-/// How much farther than windows are expected to reach distances are exact: if they reach farther, as 10 m more of depth
+/// How much farther than windows are expected to reach distances are exact. If windows reach farther, as 80 m more of depth
 /// make them, the sweep down starts anew.
 const EXACT_BEYOND: usize = 8;
 

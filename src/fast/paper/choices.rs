@@ -479,7 +479,8 @@ impl Group<'_> {
         let &Cloud { width, height, .. } = even.cloud;
         for y in row * BLOCK..(row * BLOCK + BLOCK).min(height) {
             for block in blocks {
-                prefetch(even.cloud.points[y * width + block * BLOCK].as_ptr(), 1, 1);
+                let first = even.cloud.points[y * width + block * BLOCK].as_ptr();
+                prefetch(first, BLOCK, size_of::<[f32; 3]>());
             }
         }
     }
