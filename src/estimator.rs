@@ -305,6 +305,7 @@ impl Estimator {
         let mut engine = Engine { job, scratch, own, is_plain };
         second_pass.compute(cloud, options, &mut engine)?;
         let width = cloud.width;
+        let is_whole = !is_plain && indices.is_none();
         let chosen = |at: usize| second_pass.chosen(cloud, options, at);
         if is_plain {
             let own = engine.own(second_pass.sizes())?;
@@ -319,14 +320,14 @@ impl Estimator {
             }
             let workers = scratch.workers();
             let of_left = is_along.then_some(points);
-            if indices.is_some() {
+            if is_whole {
+                fast::paper::write_chosen(&job, second_pass, cloud, normals, of_left, workers);
+            } else {
                 let left = |at| second_pass.left(of_left?, options, at);
                 write(normals, indices, width, workers, |_, at| chosen(at).or_else(|| left(at)));
-            } else {
-                fast::paper::write_chosen(&job, second_pass, cloud, normals, of_left, workers);
             }
         }
-        if options.one_sided_windows {
+        if options.one_sided_windows && !is_whole {
             write(normals, indices, width, scratch.workers(), |(x, y), at| {
                 // SAFETY: every normal has been written, and falls to one thread.
                 let has_normal = || unsafe { normals.has_normal(x, y) };

@@ -120,6 +120,10 @@ impl DepthChanges {
             let Some(gap) = cloud.gap(next, axis) else { return false };
             let last = next - gap * step;
             let jump = (inverse(next) - inverse(last)).abs();
+            // Of a pixel at depth 0 no slope is known.
+            if jump.is_nan() {
+                return false;
+            }
             let rect = |along: Range<usize>| {
                 let across = j.saturating_sub(ACROSS)..(j + ACROSS + 1).min(lines);
                 let (x, y) = if axis == 0 { (along, across) } else { (across, along) };
@@ -225,18 +229,20 @@ fn least_steps_along(steps: &[i16], beside: usize) -> i16 {
 fn slope(cloud: &Cloud, rect: &Rect, axis: usize) -> Option<f64> {
     let [mut n, mut x, mut y, mut xx, mut xy, mut yy] = [0.0; 6];
     let [mut d, mut xd, mut yd] = [0.0; 3];
-    for (row, place_y) in rect.y.clone().zip(0..) {
+    for (row, place) in rect.y.clone().zip(0..) {
         let depths = &cloud.depths[row * cloud.width..][rect.x.clone()];
-        for (depth, place_x) in depths.iter().zip(0..) {
+        let [mut row_n, mut row_x, mut row_d] = [0.0; 3];
+        for (depth, place) in depths.iter().zip(0..) {
             let inverse = f64::from(inverse_depth(*depth));
             if !inverse.is_nan() {
-                let (px, py) = (f64::from(place_x), f64::from(place_y));
-                n += 1.0;
-                (x, y, d) = (x + px, y + py, d + inverse);
-                (xx, xy, yy) = (xx + px * px, xy + px * py, yy + py * py);
-                (xd, yd) = (xd + px * inverse, yd + py * inverse);
+                let px = f64::from(place);
+                (row_n, row_x, row_d) = (row_n + 1.0, row_x + px, row_d + inverse);
+                (xx, xd) = (xx + px * px, xd + px * inverse);
             }
         }
+        let py = f64::from(place);
+        (n, x, d) = (n + row_n, x + row_x, d + row_d);
+        (y, xy, yy, yd) = (y + py * row_n, xy + py * row_x, yy + py * py * row_n, yd + py * row_d);
     }
     // About the mean, times n.
     let (xx, xy, yy) = (n * xx - x * x, n * xy - x * y, n * yy - y * y);

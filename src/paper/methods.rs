@@ -19,11 +19,14 @@ pub(crate) fn estimate(method: Method, cloud: &impl CleanPoints, rect: &Rect) ->
 /// over the trace as curvature. None if the points are on one line.
 pub(crate) fn plane_of<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> Option<Estimate> {
     let Scatter { matrix, count, .. } = Scatter::of(points)?;
+    if count < 3.0 {
+        return None;
+    }
     let (values, vector) = eigen(&matrix);
     let trace = matrix.trace();
     // Rounding keeps points on a line from a middle eigenvalue of exactly 0.
     const LINE: f64 = 1e-12;
-    if count < 3.0 || values[1] <= LINE * trace {
+    if values[1] <= LINE * trace {
         return None;
     }
     Some(Estimate { normal: vector.map(|c| c as f32), curvature: (values[0] / trace) as f32 })

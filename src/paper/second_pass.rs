@@ -221,9 +221,8 @@ impl SecondPass {
             return None;
         }
         let pixel = (at % cloud.width, at / cloud.width);
-        let same = |depth: f32, difference: f32, distance: usize| {
-            !is_depth_change(depth, difference, distance.max(1), options)
-        };
+        let depth = cloud.depths[at];
+        let same = |difference, distance| !is_depth_change(depth, difference, distance, options);
         let found = surroundings::plane_around(cloud, pixel, same)?;
         let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
         let has_curvature = options.method == Method::CovarianceMatrix;

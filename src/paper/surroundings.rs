@@ -1,6 +1,6 @@
 //! The last resort of a pixel whose surface has no window: the plane through the points around it.
 
-use super::cloud::{CleanPoints, Cloud};
+use super::cloud::Cloud;
 use super::methods::plane_of;
 use super::rect::Rect;
 use crate::methods::Estimate;
@@ -8,18 +8,35 @@ use crate::methods::Estimate;
 /// How far around: fewer points are mostly noise.
 const REACH: usize = 3;
 
-/// The plane through the points around a pixel that `is_same_surface(depth, difference, distance)` lets through.
+/// The plane through the points around a pixel whose `difference` in depth to the pixel's, at such a `distance`, is that of
+/// points on the same surface.
 pub(crate) fn plane_around(
     cloud: &Cloud,
     (x, y): (usize, usize),
-    is_same_surface: impl Fn(f32, f32, usize) -> bool,
+    is_same_surface: impl Fn(f32, usize) -> bool,
 ) -> Option<Estimate> {
+    // In the paper's semantics nothing is on one surface with a point at depth 0.
+    if !is_same_surface(0.0, 1) {
+        return None;
+    }
     let depth = cloud.depths[cloud.index(x, y)];
     let around = Rect::around((x, y), REACH, (cloud.width, cloud.height));
-    let is_same = |&(nx, ny): &(usize, usize)| {
-        let other = cloud.depths[cloud.index(nx, ny)];
-        let distance = x.abs_diff(nx).max(y.abs_diff(ny));
-        !other.is_nan() && is_same_surface(depth, other - depth, distance)
-    };
-    plane_of(|| around.pixels().filter(is_same).map(|(nx, ny)| cloud.at(nx, ny).map(f64::from)))
+    let (mut points, mut count) = ([[0.0_f32; 3]; (2 * REACH + 1).pow(2)], 0);
+    for row in around.y {
+        let at = cloud.index(around.x.start, row)..cloud.index(around.x.end, row);
+        let line = cloud.depths[at.clone()].iter().zip(&cloud.points[at]);
+        for ((other, point), column) in line.zip(around.x.clone()) {
+            let distance = x.abs_diff(column).max(y.abs_diff(row));
+            if !other.is_nan() && is_same_surface(other - depth, distance.max(1)) {
+                points[count] = *point;
+                count += 1;
+            }
+        }
+    }
+    let points = &points[..count];
+    // As where a sensor writes zeros for "no return".
+    if points.iter().all(|point| *point == points[0]) {
+        return None;
+    }
+    plane_of(|| points.iter().map(|point| point.map(f64::from)))
 }

@@ -1,4 +1,5 @@
-//! Writes the normals of the pixels of a row that take even windows, fast: the plain form is `SecondPass::chosen`.
+//! Writes the normals of the pixels of a row that take even windows, fast: the plain forms are `SecondPass::chosen` and
+//! `SecondPass::estimate_around`.
 
 use crate::cloud::{Normals, Points};
 use crate::fast::arithmetic::Floats;
@@ -20,14 +21,16 @@ pub(super) struct ChosenRow<'a> {
 }
 
 impl ChosenRow<'_> {
-    /// Writes them; the others stay as they are.
+    /// Writes them; the others stay as they are, but with one-sided windows those without a normal get one from the points
+    /// around them.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`; the row is inside the normals, and no other thread writes it.
+    /// The processor has the instruction set of `S`; the row is inside the normals, all of which were written, and no other
+    /// thread writes it.
     #[inline(always)]
     pub unsafe fn write<S: Along>(&self) {
-        let &ChosenRow { cloud, options, second_pass, normals, y, of_left } = self;
-        let (first, of_even) = (y * cloud.width, second_pass.of_even());
+        let &ChosenRow { cloud, options, second_pass, y, of_left, .. } = self;
+        let first = y * cloud.width;
         let choices = &second_pass.choices()[first..][..cloud.width];
         let concerned = second_pass.concerned().row(y);
         const { assert!(f32::from_bits(NO_WINDOW).is_nan()) };
@@ -46,48 +49,81 @@ impl ChosenRow<'_> {
                     self.write_one(x + lane);
                 }
             }
-            if lanes == 0 {
-                continue;
+            if lanes != 0 {
+                // SAFETY: as the caller's.
+                unsafe { self.write_chosen::<S>(x, choices, lanes) };
             }
-            // SAFETY: as the caller's; an estimate is four floats, and so many points are there.
-            unsafe {
-                // Lanes without a window have any one's.
-                let place = |lane: usize| (choices[lane] as usize).min(of_even.len() - 1);
-                let [nx, ny, nz, curvature] =
-                    load_by_fours::<S>(|lane| of_even[place(lane)].as_ptr());
-                // Read by fours of floats.
-                let points = cloud.points[first + x..][..=S::LANES].as_ptr().cast();
-                let [px, py, pz] = S::load_points(points, size_of::<[f32; 3]>());
-                let normal = [Floats(nx), Floats(ny), Floats(nz)];
-                let [nx, ny, nz] =
-                    turned::<S>(normal, [Floats(px), Floats(py), Floats(pz)], options.viewpoint);
-                let fields = [nx.0, ny.0, nz.0, curvature];
-                if lanes.count_ones() as usize == S::LANES {
-                    normals.write_lanes::<S>(x, y, fields, &(0..cloud.width));
-                    continue;
-                }
-                let mut found = [[0.0; LANES]; 4];
-                for (to, field) in found.iter_mut().zip(fields) {
-                    S::store(to.as_mut_ptr(), field);
-                }
-                for lane in Bits(lanes) {
-                    let [nx, ny, nz, curvature] = found.each_ref().map(|field| field[lane]);
-                    normals.write(x + lane, y, [nx, ny, nz], curvature);
-                }
+            if options.one_sided_windows {
+                let depths = &cloud.depths[first + x..][..S::LANES];
+                // SAFETY: as the caller's; there are so many depths.
+                let there = unsafe {
+                    let depths = S::load(depths.as_ptr());
+                    S::bits(S::eq(depths, depths))
+                };
+                Bits(there & !lanes).for_each(|lane| self.write_around(x + lane));
             }
         }
         for x in whole..cloud.width {
             self.write_one(x);
+            if options.one_sided_windows {
+                self.write_around(x);
+            }
         }
     }
 
-    /// Writes the normal in a column.
+    /// Writes the normals of these lanes from column `x` on, which take the windows of these blocks.
+    ///
+    /// # Safety
+    /// As [`ChosenRow::write`]; the lanes are in the row.
+    #[inline(always)]
+    unsafe fn write_chosen<S: Along>(&self, x: usize, choices: &[u32], lanes: u32) {
+        let &ChosenRow { cloud, options, second_pass, normals, y, .. } = self;
+        let of_even = second_pass.of_even();
+        // SAFETY: as the caller's; an estimate is four floats, and so many points are there.
+        unsafe {
+            // Lanes without a window have any one's.
+            let place = |lane: usize| (choices[lane] as usize).min(of_even.len() - 1);
+            let [nx, ny, nz, curvature] = load_by_fours::<S>(|lane| of_even[place(lane)].as_ptr());
+            // Read by fours of floats.
+            let points = cloud.points[y * cloud.width + x..][..=S::LANES].as_ptr().cast();
+            let [px, py, pz] = S::load_points(points, size_of::<[f32; 3]>());
+            let normal = [Floats(nx), Floats(ny), Floats(nz)];
+            let [nx, ny, nz] =
+                turned::<S>(normal, [Floats(px), Floats(py), Floats(pz)], options.viewpoint);
+            let fields = [nx.0, ny.0, nz.0, curvature];
+            if lanes.count_ones() as usize == S::LANES {
+                return normals.write_lanes::<S>(x, y, fields, &(0..cloud.width));
+            }
+            let mut found = [[0.0; LANES]; 4];
+            for (to, field) in found.iter_mut().zip(fields) {
+                S::store(to.as_mut_ptr(), field);
+            }
+            for lane in Bits(lanes) {
+                let [nx, ny, nz, curvature] = found.each_ref().map(|field| field[lane]);
+                normals.write(x + lane, y, [nx, ny, nz], curvature);
+            }
+        }
+    }
+
+    /// Writes the normal in a column, if it takes a window or could.
     #[cold]
     fn write_one(&self, x: usize) {
         let &ChosenRow { cloud, options, second_pass, normals, y, of_left } = self;
         let at = y * cloud.width + x;
         let left = || second_pass.left(of_left?, options, at);
         if let Some(found) = second_pass.chosen(cloud, options, at).or_else(left) {
+            // SAFETY: as the caller's of `write`.
+            unsafe { normals.write(x, y, found.normal, found.curvature) };
+        }
+    }
+
+    /// Writes the normal in a column where there is none so far, if the points around have one.
+    fn write_around(&self, x: usize) {
+        let &ChosenRow { cloud, options, second_pass, normals, y, .. } = self;
+        // SAFETY: as the caller's of `write`.
+        let has_normal = || unsafe { normals.has_normal(x, y) };
+        let at = y * cloud.width + x;
+        if let Some(found) = second_pass.estimate_around(cloud, options, at, has_normal) {
             // SAFETY: as the caller's of `write`.
             unsafe { normals.write(x, y, found.normal, found.curvature) };
         }

@@ -311,7 +311,7 @@ impl Sums<4> for SmoothedDepthChanges {
 }
 
 /// The differences in x and y between the outermost points of eight windows' middle rows (`line` 0) or columns, and
-/// how far apart these are.
+/// how far apart these are; NaN where there are not two.
 ///
 /// # Safety
 /// As [`Sums::note`].
@@ -338,9 +338,9 @@ unsafe fn outermost<S: Groups, const N: usize>(
             let one = each.outermost(rings, line, lane);
             for c in 0..2 {
                 let difference = |a: usize, b: usize| rings.field(b, c) - rings.field(a, c);
-                fields[c][lane] = one.map_or(0.0, |([a, b], _)| difference(a, b));
+                fields[c][lane] = one.map_or(f32::NAN, |([a, b], _)| difference(a, b));
             }
-            fields[2][lane] = one.map_or(0.0, |(_, span)| span as f32);
+            fields[2][lane] = one.map_or(f32::NAN, |(_, span)| span as f32);
         }
         let load = |c: usize| Floats::load(fields[c].as_ptr());
         [load(0), load(1), load(2)]
@@ -356,7 +356,7 @@ const DOUBT_SINE: f32 = 1e-4;
 /// And where their squares come near the smallest floats.
 const DOUBT_TINY: f32 = 1e-30;
 
-/// Horizontal and vertical tangents of a run's pixels.
+/// Horizontal and vertical tangents of a run's pixels; NaN where there is none, and certainly no normal.
 #[derive(Default)]
 pub(crate) struct Tangents([OfRun<f32, 3>; 2]);
 
@@ -391,10 +391,12 @@ impl Tangents {
             let rounding = Floats::splat(2.0 * error * error) * (h2 + v2);
             let sine = h2 * v2 * Floats::splat(DOUBT_SINE);
             let scale = Floats::splat(1.0) / n2.sqrt();
+            let sure = rounding.max(sine).max(Floats::splat(DOUBT_TINY)).lt(n2);
+            let both = S::bits(S::eq(h[0].0, h[0].0)) & S::bits(S::eq(v[0].0, v[0].0));
             Found {
                 normal: [n[0] * scale, n[1] * scale, n[2] * scale],
                 curvature: Floats::splat(f32::NAN),
-                doubtful: !rounding.max(sine).max(Floats::splat(DOUBT_TINY)).lt(n2),
+                doubtful: both & !sure,
             }
         }
     }

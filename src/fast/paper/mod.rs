@@ -155,8 +155,8 @@ pub(crate) fn compute_own(
     job.tiles(scratch, indices, normals, largest, 1)
 }
 
-/// Writes the normals of the pixels that take even windows; and, if their points are given, those of pixels that could but
-/// take none.
+/// Writes the normals of the pixels that take even windows; if their points are given, those of pixels that could but take
+/// none; and with one-sided windows those of pixels that have none then, from the points around them.
 pub(crate) fn write_chosen(
     job: &Job,
     second_pass: &SecondPass,
