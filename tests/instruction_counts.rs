@@ -8,7 +8,7 @@
 //!
 //! A cloud far from the camera's origin, as in a map's frame, may take a quarter more; one with a far plane for "no
 //! return", as simulators write, with PCL's semantics three times as many; and the paper's CM with a second pass for both
-//! one-sided and crease windows 2.8 times as many, also with zeros for "no return", as many sensors write them.
+//! one-sided and crease windows 2.3 times as many, or with zeros for "no return", as many sensors write them, 3.2 times.
 //!
 //! The program runs itself under valgrind: `frames N SEMANTICS METHOD POLICY METRES PLANE SECOND` computes N frames of a
 //! cloud that is moved to the right by so many metres, with a plane at that depth in place of missing points if it is not
@@ -95,9 +95,9 @@ fn main() -> ExitCode {
             check(count(Scene { plane: PLANE, ..usual }).0, 3 * bound, ", with a far plane");
         }
         if (semantics, method) == (Paper, CovarianceMatrix) {
-            for (plane, what) in [(f32::NAN, ""), (0.0, " and zeros")] {
+            for (plane, tenths, what) in [(f32::NAN, 23, ""), (0.0, 32, " and zeros")] {
                 let (count, _) = count(Scene { second_pass: true, plane, ..usual });
-                check(count, 3 * bound - bound / 5, &format!(", with a second pass{what}"));
+                check(count, bound * tenths / 10, &format!(", with a second pass{what}"));
             }
         }
         let (count, stages) = count(usual);
