@@ -184,6 +184,31 @@ fn windows_near_depth_changes_and_creases_equal_the_plain_form() {
     println!("{worst:?}");
 }
 
+/// Rows or columns of which only every third has points: the middle lines of windows have one point, or none.
+#[test]
+fn sparse_lines_equal_the_plain_form() {
+    let mut worst = Worst::default();
+    for axis in 0..2 {
+        let mut cloud = Cloud::new(Kind::Wavy, 93, 71, 5);
+        for (at, point) in cloud.points.iter_mut().enumerate() {
+            if [at % 93, at / 93][axis] % 3 != 1 {
+                *point = [f32::NAN; 3];
+            }
+        }
+        for mut options in paper_options() {
+            options.paper.smallest_radius = 1;
+            options.paper.least_depth_radius = 1;
+            options.paper.largest_radius = 5;
+            for second_pass in [false, true] {
+                options.crease_windows = second_pass;
+                options.one_sided_windows = second_pass;
+                worst.check(&cloud, &format!("axis {axis}"), &options);
+            }
+        }
+    }
+    println!("{worst:?}");
+}
+
 /// Several tiles and many groups a row.
 #[test]
 fn wide_clouds_equal_the_plain_form() {

@@ -392,12 +392,13 @@ impl Tangents {
             let sine = h2 * v2 * Floats::splat(DOUBT_SINE);
             let scale = Floats::splat(1.0) / n2.sqrt();
             let sure = rounding.max(sine).max(Floats::splat(DOUBT_TINY)).lt(n2);
-            let both = S::bits(S::eq(h[0].0, h[0].0)) & S::bits(S::eq(v[0].0, v[0].0));
-            Found {
-                normal: [n[0] * scale, n[1] * scale, n[2] * scale],
-                curvature: Floats::splat(f32::NAN),
-                doubtful: both & !sure,
+            let both = S::and(S::eq(h[0].0, h[0].0), S::eq(v[0].0, v[0].0));
+            let none = Floats::splat(f32::NAN);
+            let mut normal = [none; 3];
+            for c in 0..3 {
+                normal[c].take(both, n[c] * scale);
             }
+            Found { normal, curvature: none, doubtful: S::bits(both) & !sure }
         }
     }
 }

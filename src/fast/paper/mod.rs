@@ -66,15 +66,20 @@ pub(crate) struct Scratch {
     /// Row by row the least and the largest of their magnitudes.
     ranges: Vec<[f32; 2]>,
     radii: Buffer<f32>,
+    /// The largest of them.
+    largest: usize,
     radii_of_blocks: Buffer<f32>,
     chunks: Vec<Chunk>,
+    /// The pixels that take even windows.
+    taken: Marks,
 }
 
 impl Scratch {
     /// Bytes held.
     pub fn size(&self) -> usize {
-        let Scratch { depths, ranges, radii, radii_of_blocks, chunks } = self;
-        depths.size() + bytes(ranges) + radii.size() + radii_of_blocks.size() + bytes(chunks)
+        let Scratch { depths, ranges, radii, radii_of_blocks, chunks, taken, .. } = self;
+        let radii = radii.size() + radii_of_blocks.size();
+        depths.size() + bytes(ranges) + radii + bytes(chunks) + taken.size()
     }
 }
 
@@ -111,8 +116,8 @@ pub(crate) fn compute(
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
     job.depths(scratch)?;
-    let largest = job.radii(scratch)?;
-    job.tiles(scratch, indices, normals, largest, 1)
+    job.radii(scratch)?;
+    job.tiles(scratch, indices, normals, scratch.paper.largest, 1, None)
 }
 
 /// Reads the depths for [`even_windows`] and [`compute_of_blocks`].
@@ -147,12 +152,17 @@ pub(crate) fn compute_own(
     normals: &Normals,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
-    let width = job.points.width();
-    let largest = job.own_radii(scratch, |y, word| {
-        let choices = choices[y * width..][..width][word * WORD..].iter();
-        word_of(choices.map(|choice| *choice != NO_WINDOW))
+    let (width, height) = (job.points.width(), job.points.height());
+    let mut taken = std::mem::take(&mut scratch.paper.taken);
+    taken.clear((width, height))?;
+    scratch.workers.each(taken.rows().zip(choices.chunks(width)), |(taken, choices)| {
+        for (word, choices) in taken.iter_mut().zip(choices.chunks(WORD)) {
+            *word = word_of(choices.iter().map(|choice| *choice != NO_WINDOW));
+        }
     });
-    job.tiles(scratch, indices, normals, largest, 1)
+    let done = job.tiles(scratch, indices, normals, scratch.paper.largest, 1, Some(&taken));
+    scratch.paper.taken = taken;
+    done
 }
 
 /// Writes the normals of the pixels that take even windows; if their points are given, those of pixels that could but take
@@ -182,7 +192,7 @@ pub(crate) fn compute_of_blocks(
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
     let largest = job.radii_of_blocks(scratch, radii)?;
-    job.tiles(scratch, None, normals, largest, BLOCK)
+    job.tiles(scratch, None, normals, largest, BLOCK, None)
 }
 
 /// Makes a cloud that of the job's points, as [`Cloud::read`].
@@ -408,12 +418,12 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// The radii of all windows, in the chunks' rows; gives the largest.
+    /// The radii of all windows, in the chunks' rows.
     #[inline(never)]
-    fn radii(&self, scratch: &mut super::Scratch) -> Result<usize, Error> {
+    fn radii(&self, scratch: &mut super::Scratch) -> Result<(), Error> {
         let &Job { points, options, .. } = self;
         let super::Scratch { workers, each, paper, .. } = scratch;
-        let Scratch { depths, radii, chunks, .. } = paper;
+        let Scratch { depths, radii, largest: of_all, chunks, .. } = paper;
         let (width, height) = (points.width(), points.height());
         let (count, length) = (workers.count(), row_length(width));
         let reach = if count > 1 { reach(&options.paper) } else { height };
@@ -451,31 +461,8 @@ impl Job<'_> {
                 }
             }
         }
-        Ok(largest.into_inner() as usize)
-    }
-
-    /// Leaves out the pixels that are marked in what `left_out` gives for a row and a word; gives the largest radius of the
-    /// others.
-    fn own_radii(
-        &self,
-        scratch: &mut super::Scratch,
-        left_out: impl Fn(usize, usize) -> u64 + Sync,
-    ) -> usize {
-        let width = self.points.width();
-        let length = row_length(width);
-        let super::Scratch { workers, paper: Scratch { radii, chunks, .. }, .. } = scratch;
-        let largest = AtomicU32::new(0);
-        let parts = Parts(radii.as_mut_ptr());
-        workers.for_each(self.points.height(), |_, y| {
-            let at = place_of(chunks, y) * length;
-            // SAFETY: each row is one thread's.
-            let radii = unsafe { parts.part(at..at + length) };
-            let left_out = |word: usize| left_out(y, word);
-            // SAFETY: the processor has the instruction set.
-            let radius = unsafe { paths::run(self.isa, LeaveOutTask { width, radii, left_out }) };
-            largest.fetch_max(radius as u32, Ordering::Relaxed);
-        });
-        largest.into_inner() as usize
+        *of_all = largest.into_inner() as usize;
+        Ok(())
     }
 
     /// Takes over radii of blocks; gives the largest.
@@ -505,8 +492,8 @@ impl Job<'_> {
         (&depths[y * length..][..length], &radii[..length_of_radii])
     }
 
-    /// The normals of the middle pixels of blocks of `step` x `step` pixels, tile by tile; no window's radius is above
-    /// `largest`.
+    /// The normals of the middle pixels of blocks of `step` x `step` pixels, tile by tile, as [`Tile`] has them; no window's
+    /// radius is above `largest`.
     #[inline(never)]
     fn tiles(
         &self,
@@ -515,6 +502,7 @@ impl Job<'_> {
         normals: &Normals,
         largest: usize,
         step: usize,
+        left_out: Option<&Marks>,
     ) -> Result<(), Error> {
         let &Job { points, options, whole_points, .. } = self;
         let super::Scratch { workers, each, listed, paper, .. } = scratch;
@@ -539,7 +527,8 @@ impl Job<'_> {
         }
         workers.for_each(grid.count(), |worker, item| {
             let Some((columns, rows)) = grid.tile(item) else { return };
-            let tile = Tile { points, options, columns, rows, whole_points, largest, step, row };
+            let tile =
+                Tile { points, options, columns, rows, whole_points, largest, step, row, left_out };
             let scratch = &mut lock(&each[worker]).paper;
             each_layer(&tile, &paper.ranges, span(options.method), |layer| {
                 let (tile, sink) = (&tile, &sink);
@@ -566,11 +555,9 @@ impl Job<'_> {
         largest: usize,
     ) -> Result<(), Error> {
         let &Job { points, options, whole_points, .. } = self;
-        let of_own = own.as_ref().map_or(0, |Own { concerned, .. }| {
-            self.own_radii(scratch, |y, word| concerned.row(y)[word])
-        });
-        let largest = largest.max(of_own);
         let super::Scratch { workers, each, listed, paper, .. } = scratch;
+        let left_out = own.as_ref().map(|own| own.concerned);
+        let largest = if left_out.is_some() { largest.max(paper.largest) } else { largest };
         let (width, height) = (points.width(), points.height());
         let sink = own.map(|own| Sink::new(own.normals, own.indices, width, listed)).transpose()?;
         let length = row_length(width);
@@ -587,8 +574,10 @@ impl Job<'_> {
         }
         workers.for_each(grid.count(), |worker, item| {
             let Some((columns, rows)) = grid.tile(item) else { return };
-            let tile = Tile { points, options, columns, rows, whole_points, largest, step: 1, row };
-            let blocks = Tile { step: BLOCK, ..tile.clone() };
+            let step = 1;
+            let tile =
+                Tile { points, options, columns, rows, whole_points, largest, step, row, left_out };
+            let blocks = Tile { step: BLOCK, left_out: None, ..tile.clone() };
             let tile = EvenTile { even, blocks, tile, sink: sink.as_ref() };
             let WorkerScratch { moments: rings, waiting, .. } = &mut lock(&each[worker]).paper;
             each_layer(&tile.tile, &paper.ranges, span(options.method), |layer| {
@@ -724,24 +713,6 @@ impl Task for SweepTask<'_> {
     unsafe fn run<S: Groups>(mut self) -> f32 {
         // SAFETY: as the caller's.
         unsafe { self.sweep.radii::<S::Pair>(&mut self.rows, &self.options.paper) }
-    }
-}
-
-/// The radii of a row, as [`windows::leave_out`] has it.
-struct LeaveOutTask<'a, F> {
-    width: usize,
-    radii: &'a mut [f32],
-    left_out: F,
-}
-
-impl<F: Fn(usize) -> u64> Task for LeaveOutTask<'_, F> {
-    type Output = f32;
-
-    #[inline(always)]
-    unsafe fn run<S: Groups>(self) -> f32 {
-        let LeaveOutTask { width, radii, left_out } = self;
-        // SAFETY: as the caller's.
-        unsafe { windows::leave_out::<S::Widest>(width, radii, left_out) }
     }
 }
 
@@ -885,28 +856,6 @@ mod tests {
                         .unwrap();
                     let [found, expected] = [found, expected].map(|changes| format!("{changes:?}"));
                     assert_eq!(found, expected, "{isa:?} {semantics:?} {width} x {height}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn pixels_are_left_out() {
-        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
-            for width in [1, 15, 16, 63, 64, 65, 130] {
-                let is_left_out = |x: usize| x * 7919 % 5 < 2;
-                let radius = |x: usize| (x * 31 % 17) as f32;
-                let mut radii = vec![40.0; row_length(width)];
-                (0..width).for_each(|x| radii[x] = radius(x));
-                let left_out =
-                    |word: usize| word_of((0..WORD).map(|x| is_left_out(word * WORD + x)));
-                let task = LeaveOutTask { width, radii: &mut radii, left_out };
-                // SAFETY: the processor has the instruction set.
-                let largest = unsafe { paths::run(isa, task) };
-                let left = (0..width).filter(|x| !is_left_out(*x));
-                assert_eq!(largest, left.map(radius).fold(0.0, f32::max));
-                for (x, found) in radii[..width].iter().enumerate() {
-                    assert_eq!(*found, if is_left_out(x) { -1.0 } else { radius(x) });
                 }
             }
         }

@@ -16,7 +16,7 @@ use crate::fast::tile::{Bits, Estimates, all};
 use crate::methods::Estimate;
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
-use crate::paper::{CleanPoints, Cleaned, Rect, middle, plain_estimate, window};
+use crate::paper::{CleanPoints, Cleaned, Marks, Rect, marks_from, middle, plain_estimate, window};
 use crate::simd::{Along, GROUP, Groups};
 
 /// A rectangle of the image whose normals are computed together.
@@ -31,9 +31,10 @@ pub(crate) struct Tile<'a, F> {
     pub largest: usize,
     /// Columns and rows of the blocks whose middle pixels get the normals, at most `BLOCK`; the tile starts with one.
     pub step: usize,
-    /// A row's depths, and the radii of its windows, if it has normals: 0 for none, -1 for a pixel that is left
-    /// out. Both can be read up to a whole group.
+    /// A row's depths, and the radii of its windows, if it has normals: 0 for none. Both can be read up to a whole group.
     pub row: F,
+    /// Pixels that are not written.
+    pub left_out: Option<&'a Marks>,
 }
 
 impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
@@ -177,6 +178,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
         let (width, height) = (self.points.width(), self.points.height());
         let layer = rings.layer;
         let radii = (self.row)(y).1;
+        let left_out = self.left_out.map(|marks| marks.row(y));
         let step = self.step;
         let points = rings.around(middle(y, step, height));
         let mut rows = Rows::new(rings, 0, M::EDGE);
@@ -184,9 +186,9 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
             run.start = start;
             (run.lanes, run.left_out) = ([0; RUN / LANES], [0; RUN / LANES]);
             let own = [(start - self.columns.start) / step, (y - self.rows.start) / step];
-            let all = [u32::MAX; RUN / LANES];
             let is_later = PARTIAL && !layer.is_first;
-            let asked = if is_later { *waiting.run(own[0], own[1]) } else { all };
+            let asked =
+                if is_later { *waiting.run(own[0], own[1]) } else { [u32::MAX; RUN / LANES] };
             let mut hidden = [0; RUN / LANES];
             let end = self.columns.end.min(start + RUN * step);
             for (group, x) in (start..end).step_by(GROUP * step).enumerate() {
@@ -197,10 +199,12 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                 unsafe {
                     let eight = S::load(radii[x / step..].as_ptr());
                     let (pair, shift) = (at / LANES, at % LANES);
-                    run.left_out[pair] |= S::bits(S::lt(eight, S::splat(0.0))) << shift;
+                    let out = left_out.map_or(0, |row| marks_from(row, x) as u32 & all(GROUP));
+                    run.left_out[pair] |= out << shift;
                     let windows = S::bits(S::lt(S::splat(0.0), eight))
                         & (asked[pair] >> shift)
-                        & ((1 << count) - 1);
+                        & all(count)
+                        & !out;
                     if windows == 0 {
                         continue;
                     }

@@ -11,9 +11,7 @@ use super::depths::row_length;
 use crate::Error;
 use crate::fast::buffer::Buffer;
 use crate::fast::lanes::{LANES, Lanes};
-use crate::fast::tile::all;
 use crate::options::PaperOptions;
-use crate::paper::WORD;
 use crate::simd::Simd;
 
 /// More than any distance that matters; its square still fits a float exactly enough to stay the larger.
@@ -246,37 +244,6 @@ impl Sweep {
             S::store(lanes.as_mut_ptr(), largest);
             lanes.into_iter().fold(0.0, f32::max)
         }
-    }
-}
-
-/// Replaces radii of a row by -1, those that `left_out` marks in a word, and those behind the last column; gives the largest
-/// of the others.
-///
-/// # Safety
-/// The processor has the instruction set of `S`.
-#[inline(always)]
-pub(super) unsafe fn leave_out<S: Simd>(
-    width: usize,
-    radii: &mut [f32],
-    left_out: impl Fn(usize) -> u64,
-) -> f32 {
-    let radii = &mut radii[..width.next_multiple_of(LANES)];
-    // SAFETY: as the caller's; there are whole groups of lanes.
-    unsafe {
-        let (none, mut largest) = (S::splat(-1.0), S::splat(0.0));
-        for (word, radii) in radii.chunks_mut(WORD).enumerate() {
-            let behind = u64::MAX.checked_shl((width - word * WORD) as u32).unwrap_or(0);
-            let left_out = left_out(word) | behind;
-            for x in (0..radii.len()).step_by(S::LANES) {
-                let out = S::mask((left_out >> x) as u32 & all(S::LANES));
-                let radius = S::select(out, none, S::load(radii.as_ptr().add(x)));
-                S::store(radii.as_mut_ptr().add(x), radius);
-                largest = S::max(radius, largest);
-            }
-        }
-        let mut lanes = [0.0; LANES];
-        S::store(lanes.as_mut_ptr(), largest);
-        lanes.into_iter().fold(0.0, f32::max)
     }
 }
 
