@@ -140,8 +140,9 @@ pub(crate) struct Scale {
     doubt: f32,
 }
 
-/// A normal is doubtful where rounding to integers could turn it by more than this, or where floats could: (sine of the
-/// angle between the tangents) < 1e-3.
+/// A normal is doubtful where rounding to integers could turn it by more than this, if one coordinate of each gradient were
+/// as far off as it can be (all three, at worst, turn it by the root of six times as much), or where floats could: (sine of
+/// the angle between the tangents) < 1e-3.
 const DOUBT: f32 = 1.5e-4;
 const DOUBT_SINE: f32 = 1e-6;
 
