@@ -12,8 +12,8 @@
 //!
 //! The program runs itself under valgrind: `frames N SEMANTICS METHOD POLICY METRES PLANE SECOND` computes N frames of a
 //! cloud that is moved to the right by so many metres, with a plane at that depth in place of missing points if it is not
-//! NaN, and with a second pass if that is 1. The counts are the difference between two frames and one, so neither start nor the first frame's
-//! allocations are in them.
+//! NaN, and with a second pass if that is 1. The counts are the difference between two frames and one, so neither start
+//! nor the first frame's allocations are in them.
 
 #[path = "../benches/common/mod.rs"]
 mod common;
