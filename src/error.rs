@@ -29,8 +29,8 @@ pub enum Error {
     Unsupported = 8,
     /// An index is negative or not below width x height.
     Index = 9,
-    /// Scratch memory could not be allocated. Nothing is written then, or NaN everywhere where depths in the middle of a
-    /// frame turn out to need more memory than there is.
+    /// Memory could not be allocated; without that for starting threads, the process may be aborted instead. Nothing is
+    /// written then, or NaN everywhere where depths in the middle of a frame turn out to need more memory than there is.
     OutOfMemory = 10,
     /// The worker threads asked for could not be started.
     Threads = 11,
@@ -60,7 +60,9 @@ impl Error {
         match self {
             Error::NullPointer => c"a required pointer is NULL",
             Error::StructSize => c"struct_size is not a known size of the struct",
-            Error::Size => c"width or height is zero, or the buffer does not fit",
+            Error::Size => {
+                c"width or height is zero, their product is too large, or the buffer does not fit"
+            }
             Error::Stride => c"a stride is not a multiple of 4 bytes or is too small",
             Error::Misaligned => c"a pointer is not aligned to its type",
             Error::Overlap => c"output bytes overlap input bytes or other output bytes",

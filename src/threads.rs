@@ -11,6 +11,8 @@ use crate::Error;
 #[derive(Debug, Default)]
 pub(crate) struct Workers {
     pool: Option<ThreadPool>,
+    /// The process that has the pool's threads: a fork of it has none of them.
+    process: u32,
 }
 
 impl Workers {
@@ -20,6 +22,12 @@ impl Workers {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
             threads => threads,
         };
+        let process = std::process::id();
+        if self.process != process {
+            // To drop it is to wait for its threads.
+            std::mem::forget(self.pool.take());
+            self.process = process;
+        }
         if threads == 1 {
             self.pool = None;
         } else if self.count() != threads {

@@ -4,6 +4,7 @@
 mod clouds;
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use clouds::{
@@ -12,21 +13,26 @@ use clouds::{
 };
 use iine::{Error, Estimator, Isa, Maps, Method, Normals, Options, Semantics};
 
-/// How many more large blocks there is memory for.
+/// How many more blocks there is memory for.
 static LEFT: AtomicUsize = AtomicUsize::new(usize::MAX);
 
-/// From so many bytes on a block is a large one. What threads and their pool ask for is less; so are a few short-lived
-/// lists whose lengths do not depend on the image.
+thread_local! {
+    /// The least bytes of a block that is counted.
+    static LEAST: Cell<usize> = const { Cell::new(LARGE) };
+}
+
+/// What threads and their pool ask for is less, as is what the plain form's short lists do: without it, they abort.
 const LARGE: usize = 4096;
 
-/// Has nothing for those who ask for a large block when no more are left.
+/// Has nothing for those who ask for a block that is counted when no more are left.
 struct Limited;
 
 impl Limited {
     fn has(&self, size: usize) -> bool {
         let one_less =
             |left: usize| if left < usize::MAX { left.checked_sub(1) } else { Some(left) };
-        size < LARGE || LEFT.fetch_update(Ordering::Relaxed, Ordering::Relaxed, one_less).is_ok()
+        size < LEAST.get()
+            || LEFT.fetch_update(Ordering::Relaxed, Ordering::Relaxed, one_less).is_ok()
     }
 }
 
@@ -57,11 +63,18 @@ unsafe impl GlobalAlloc for Limited {
 #[global_allocator]
 static ALLOCATOR: Limited = Limited;
 
-/// Runs `work` with memory for no large block, for one, and so on, until it succeeds; returns how many that took.
-fn until_there_is_enough(mut work: impl FnMut() -> Result<(), Error>, what: &str) -> usize {
+/// Runs `work` with memory for no block, for one, and so on, until it succeeds; returns how many that took. On one thread
+/// every block counts, but in the plain form.
+fn until_there_is_enough(
+    (isa, threads): (Isa, usize),
+    mut work: impl FnMut() -> Result<(), Error>,
+    what: &str,
+) -> usize {
     for blocks in 0..1000 {
         LEFT.store(blocks, Ordering::Relaxed);
+        LEAST.set(if threads == 1 && isa != Isa::Scalar { 0 } else { LARGE });
         let result = work();
+        LEAST.set(LARGE);
         LEFT.store(usize::MAX, Ordering::Relaxed);
         match result {
             Ok(()) => return blocks,
@@ -103,6 +116,7 @@ fn missed_in_the_middle() {
         let mut found = vec![[7.0; 4]; cloud.points.len()];
         let mut none = 0;
         until_there_is_enough(
+            (Isa::active(), 1),
             || {
                 found.fill([7.0; 4]);
                 let result = compute_to(&mut found, &mut Estimator::new(options.clone()), &cloud);
@@ -133,6 +147,7 @@ fn missed_for_another_width() {
         let mut found = vec![[7.0; 4]; wide.points.len()];
         let what = format!("another width: {options:?}");
         until_there_is_enough(
+            (Isa::active(), 1),
             || {
                 let blocks = LEFT.swap(usize::MAX, Ordering::Relaxed);
                 let mut estimator = Estimator::new(options.clone());
@@ -160,6 +175,7 @@ fn normals(isa: Isa, cloud: &Cloud, options: &Options) {
         let what = format!("{isa:?} {options:?}");
         let mut found = vec![[7.0; 4]; cloud.points.len()];
         let blocks = until_there_is_enough(
+            (isa, threads),
             || {
                 let mut estimator = Estimator::with_isa(options.clone(), isa);
                 let result = compute_to(&mut found, &mut estimator, cloud);
@@ -179,6 +195,7 @@ fn normals(isa: Isa, cloud: &Cloud, options: &Options) {
 
         let mut listed = vec![[7.0; 4]; indices.len()];
         let blocks = until_there_is_enough(
+            (isa, threads),
             || {
                 let mut estimator = Estimator::with_isa(options.clone(), isa);
                 let data = listed.as_flattened_mut();
@@ -205,6 +222,7 @@ fn maps(isa: Isa, cloud: &Cloud, options: &Options) {
         let has_eigenvalues = options.method == Method::CovarianceMatrix;
         let mut estimator = Estimator::with_isa(options.clone(), isa);
         until_there_is_enough(
+            (isa, 1),
             || {
                 let mut maps = Maps {
                     distances: Some(&mut distances),
@@ -224,6 +242,7 @@ fn maps(isa: Isa, cloud: &Cloud, options: &Options) {
         );
         let mut found = [7.0; 4];
         let blocks = until_there_is_enough(
+            (isa, 1),
             || {
                 let mut normal = Normals::interleaved(&mut found, 1, 1, 4, 0, Some(3)).unwrap();
                 estimator.compute_window(&cloud.view(), (40, 30), (9, 9), &mut normal)

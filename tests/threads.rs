@@ -291,6 +291,33 @@ fn threads_that_cannot_start_are_an_error() {
     assert_same_bits(&compute(&mut estimator, &cloud), &expected, cloud.width, "one thread");
 }
 
+/// A fork has none of its parent's threads.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_forked_process_starts_threads_of_its_own() {
+    let cloud = Cloud::new(Kind::Wavy, 64, 48, 24);
+    let mut estimator = Estimator::new(Options::default());
+    estimator.options_mut().threads = 2;
+    let expected = compute(&mut estimator, &cloud);
+    // SAFETY: the child computes, and ends before anything of the test's goes on in it.
+    let child = unsafe { libc::fork() };
+    if child == 0 {
+        // SAFETY: these end the child: what waits for threads that are not there would do so for ever.
+        unsafe { libc::alarm(60) };
+        let found = compute(&mut estimator, &cloud);
+        let bits =
+            |normals: &[[f32; 4]]| normals.as_flattened().iter().map(|c| c.to_bits()).collect();
+        let [found, expected]: [Vec<u32>; 2] = [bits(&found), bits(&expected)];
+        // SAFETY: as above.
+        unsafe { libc::_exit(i32::from(found != expected)) };
+    }
+    let mut status = 0;
+    // SAFETY: the child is ours, and the status can be written to.
+    assert_eq!(unsafe { libc::waitpid(child, &mut status, 0) }, child);
+    assert_eq!(status, 0, "the child was stopped, or found other normals");
+    assert_same_bits(&compute(&mut estimator, &cloud), &expected, cloud.width, "the parent");
+}
+
 #[test]
 fn the_second_pass_keeps_its_tables() {
     let cloud = Cloud::new(Kind::NanBlocks, 200, 150, 17);

@@ -2,8 +2,9 @@
  * iine: normals of organized point clouds by integral images.
  *
  * Functions return a status: IINE_OK (0), or one of IINE_ERROR_*, and then have written nothing (but see
- * IINE_ERROR_OUT_OF_MEMORY); iine_status_string() has the text. Nothing here prints, exits or throws; with
- * IINE_ERROR_INTERNAL alone, a defect of this library, stderr says what went wrong.
+ * IINE_ERROR_OUT_OF_MEMORY); iine_status_string() has the text. Nothing here prints, exits or throws, unless the
+ * memory for starting threads is missing; with IINE_ERROR_INTERNAL alone, a defect of this library, stderr says what
+ * went wrong.
  */
 
 #ifndef IINE_IINE_H
@@ -317,7 +318,7 @@ extern "C" {
 /**
  * Makes an estimator with the default options and writes it to `*estimator`.
  *
- * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_MISALIGNED.
+ * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_MISALIGNED, IINE_ERROR_OUT_OF_MEMORY.
  *
  * # Safety
  * `estimator` is NULL or valid for a write.
@@ -392,8 +393,8 @@ int32_t iine_estimator_compute_window(struct iine_estimator *estimator,
 /**
  * Computes the maps behind the normals: those whose pointers in `maps` are not NULL.
  *
- * A map must overlap neither another map nor the range of bytes from a coordinate's first pixel to its last. They are those of the smoothing area map's own windows, whatever one-sided windows and crease windows make of
- * them.
+ * They are those of the smoothing area map's own windows, whatever one-sided windows and crease windows make of them.
+ * A map must overlap neither another map nor the range of bytes from a coordinate's first pixel to its last.
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_STRUCT_SIZE, IINE_ERROR_SIZE, IINE_ERROR_STRIDE,
  * IINE_ERROR_MISALIGNED, IINE_ERROR_OVERLAP, IINE_ERROR_OUT_OF_MEMORY; IINE_ERROR_UNSUPPORTED for depth radii
@@ -419,7 +420,7 @@ int32_t iine_estimator_compute_maps(struct iine_estimator *estimator,
 int32_t iine_estimator_scratch_size(const struct iine_estimator *estimator, size_t *bytes);
 
 /**
- * Frees the estimator's scratch memory and has its worker threads end; the next computation makes them anew.
+ * Frees the estimator's scratch memory and has its worker threads end, which they do soon after; the next computation makes them anew.
  *
  * Errors: IINE_ERROR_NULL_POINTER.
  *
@@ -495,7 +496,9 @@ int32_t iine_estimator_set_viewpoint(struct iine_estimator *estimator, float x, 
 
 /**
  * Sets the number of threads: 1 (the default) computes on the calling thread, 0 takes one per core. The result
- * does not depend on it, bit for bit.
+ * does not depend on it, bit for bit. They are started by the next computation, and live until another number is asked
+ * for; in a fork of the process, by the next computation there. Where memory for starting them is missing, the process
+ * may be aborted.
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE above 1024.
  *

@@ -1,5 +1,7 @@
 //! The estimator handle.
 
+use std::alloc::{Layout, alloc};
+
 use super::boundary::{check_writable, guard, read_sized, reference, reference_mut, write};
 use super::types::{iine_maps, iine_normals, iine_points};
 use crate::{Error, Estimator, Maps, Normals, Options, Points};
@@ -14,7 +16,7 @@ pub struct iine_estimator {
 
 /// Makes an estimator with the default options and writes it to `*estimator`.
 ///
-/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_MISALIGNED.
+/// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_MISALIGNED, IINE_ERROR_OUT_OF_MEMORY.
 ///
 /// # Safety
 /// `estimator` is NULL or valid for a write.
@@ -22,9 +24,16 @@ pub struct iine_estimator {
 pub unsafe extern "C" fn iine_estimator_new(estimator: *mut *mut iine_estimator) -> i32 {
     guard(|| {
         check_writable(estimator)?;
-        let new = Box::new(iine_estimator { estimator: Estimator::new(Options::default()) });
-        // SAFETY: promised by the caller.
-        unsafe { write(estimator, Box::into_raw(new)) }
+        // SAFETY: it has a size.
+        let new = unsafe { alloc(Layout::new::<iine_estimator>()) }.cast::<iine_estimator>();
+        if new.is_null() {
+            return Err(Error::OutOfMemory);
+        }
+        // SAFETY: there is room for one; the rest is promised by the caller.
+        unsafe {
+            new.write(iine_estimator { estimator: Estimator::new(Options::default()) });
+            write(estimator, new)
+        }
     })
 }
 
@@ -36,7 +45,7 @@ pub unsafe extern "C" fn iine_estimator_new(estimator: *mut *mut iine_estimator)
 pub unsafe extern "C" fn iine_estimator_free(estimator: *mut iine_estimator) {
     guard(|| {
         if !estimator.is_null() {
-            // SAFETY: promised by the caller.
+            // SAFETY: promised by the caller; it was allocated as a box's content is.
             drop(unsafe { Box::from_raw(estimator) });
         }
         Ok(())
@@ -177,8 +186,8 @@ pub unsafe extern "C" fn iine_estimator_compute_window(
 
 /// Computes the maps behind the normals: those whose pointers in `maps` are not NULL.
 ///
-/// A map must overlap neither another map nor the range of bytes from a coordinate's first pixel to its last. They are those of the smoothing area map's own windows, whatever one-sided windows and crease windows make of
-/// them.
+/// They are those of the smoothing area map's own windows, whatever one-sided windows and crease windows make of them.
+/// A map must overlap neither another map nor the range of bytes from a coordinate's first pixel to its last.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_STRUCT_SIZE, IINE_ERROR_SIZE, IINE_ERROR_STRIDE,
 /// IINE_ERROR_MISALIGNED, IINE_ERROR_OVERLAP, IINE_ERROR_OUT_OF_MEMORY; IINE_ERROR_UNSUPPORTED for depth radii
@@ -227,14 +236,17 @@ fn check_maps_disjoint(maps: &iine_maps, pixels: usize, points: &Points) -> Resu
         (maps.depth_radii.addr(), float_bytes),
         (maps.eigenvalues.addr(), 3 * float_bytes),
     ];
-    let mut seen: Vec<(usize, usize)> = Vec::new();
-    for (start, bytes) in maps.into_iter().filter(|(start, _)| *start != 0) {
+    let mut seen = [(0, 0); 5];
+    for (i, (start, bytes)) in maps.into_iter().enumerate() {
+        if start == 0 {
+            continue;
+        }
         let end = start.checked_add(bytes).ok_or(Error::Size)?;
-        let overlaps_map = seen.iter().any(|&(from, to)| start < to && from < end);
+        let overlaps_map = seen.into_iter().any(|(from, to)| start < to && from < end);
         if overlaps_map || points.reach_into(start, end) {
             return Err(Error::Overlap);
         }
-        seen.push((start, end));
+        seen[i] = (start, end);
     }
     Ok(())
 }
@@ -272,7 +284,7 @@ pub unsafe extern "C" fn iine_estimator_scratch_size(
     })
 }
 
-/// Frees the estimator's scratch memory and has its worker threads end; the next computation makes them anew.
+/// Frees the estimator's scratch memory and has its worker threads end, which they do soon after; the next computation makes them anew.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER.
 ///

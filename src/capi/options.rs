@@ -169,7 +169,9 @@ pub unsafe extern "C" fn iine_estimator_set_viewpoint(
 }
 
 /// Sets the number of threads: 1 (the default) computes on the calling thread, 0 takes one per core. The result
-/// does not depend on it, bit for bit.
+/// does not depend on it, bit for bit. They are started by the next computation, and live until another number is asked
+/// for; in a fork of the process, by the next computation there. Where memory for starting them is missing, the process
+/// may be aborted.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE above 1024.
 ///

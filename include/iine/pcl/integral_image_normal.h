@@ -36,7 +36,7 @@ namespace iine
     * - the cloud is read when compute is called, not when it is set;
     * - output k belongs to indices[k] whatever the indices are, and equals what the whole cloud gives there;
     * - results are defined where PCL reads or writes out of bounds (see docs/pcl-compatibility.md);
-    * - objects can be copied, moved, and reused for clouds of any size;
+    * - objects can be copied and reused for clouds of any size;
     * - no search tree is built, and the search parameters of the base class have no effect.
     *
     * One object is used by one thread at a time; different objects freely.
@@ -111,16 +111,9 @@ namespace iine
       /** \brief Copy constructor: the copy has the same options, cloud, indices and results. */
       IntegralImageNormalEstimation (const IntegralImageNormalEstimation &) = default;
 
-      /** \brief Move constructor; what was moved from can be used further. */
-      IntegralImageNormalEstimation (IntegralImageNormalEstimation &&) = default;
-
       /** \brief Copy assignment. */
       IntegralImageNormalEstimation &
       operator= (const IntegralImageNormalEstimation &) = default;
-
-      /** \brief Move assignment. */
-      IntegralImageNormalEstimation &
-      operator= (IntegralImageNormalEstimation &&) = default;
 
       /** \brief Destructor. */
       ~IntegralImageNormalEstimation () override = default;
@@ -354,13 +347,14 @@ namespace iine
       }
 
       /** \brief Set the number of threads; the result does not depend on it. Not in PCL's class.
-        * \param[in] number_of_threads at most 1024; 1 (the default) computes on the calling thread, 0 takes one per
-        * core
+        * \param[in] number_of_threads 1 (the default) computes on the calling thread, 0 takes one per core; above 1024 it
+        * is refused with a printed error
         */
       void
       setNumberOfThreads (unsigned number_of_threads)
       {
-        options_.number_of_threads = number_of_threads;
+        if (isTaken ("setNumberOfThreads", iine_estimator_set_threads (handle_.get (), number_of_threads)))
+          options_.number_of_threads = number_of_threads;
       }
 
       /** \brief Set whose definition of the windows and sums is followed. Not in PCL's class.
@@ -594,7 +588,6 @@ namespace iine
         public:
           Handle () = default;
           Handle (const Handle &) noexcept {}
-          Handle (Handle &&) noexcept = default;
           ~Handle () = default;
 
           Handle &
@@ -602,9 +595,6 @@ namespace iine
           {
             return (*this);
           }
-
-          Handle &
-          operator= (Handle &&) noexcept = default;
 
           /** \brief Get the estimator; null if it cannot be made. */
           iine_estimator *

@@ -35,7 +35,7 @@ use super::{Parts, lock};
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
-use crate::memory::{bytes, make_room, resize};
+use crate::memory::{bytes, make_room, refill, resize};
 use crate::options::{DistanceMetric, Method, Options};
 use crate::paper::{
     Asked, BLOCK, Blocks, Cloud, DepthChanges, EvenWindow, EvenWindows, Marks, NO_WINDOW,
@@ -321,18 +321,23 @@ fn place_of(chunks: &[Chunk], y: usize) -> usize {
 
 /// The rows shared out to `count` sweeps. A depth change more than `reach` away decides no window, so each sweep can
 /// start and end that far around its own rows.
-fn share_out(height: usize, count: usize, reach: usize, chunks: &mut Vec<Chunk>) {
+fn share_out(
+    height: usize,
+    count: usize,
+    reach: usize,
+    chunks: &mut Vec<Chunk>,
+) -> Result<(), Error> {
     let per_chunk = height.div_ceil(count);
     let per_chunk = if per_chunk < 2 * reach { height } else { per_chunk };
     let mut start = 0;
     let first_rows = (0..height).step_by(per_chunk);
-    chunks.clear();
-    chunks.extend(first_rows.map(|first| {
+    let chunk = |first: usize| {
         let own = first..(first + per_chunk).min(height);
         let swept = own.start.saturating_sub(reach)..(own.end + reach).min(height);
         start += swept.len();
         Chunk { own, start: start - swept.len(), swept }
-    }));
+    };
+    refill(chunks, first_rows.map(chunk))
 }
 
 /// The image in tiles of like sizes.
@@ -427,7 +432,7 @@ impl Job<'_> {
         let (width, height) = (points.width(), points.height());
         let (count, length) = (workers.count(), row_length(width));
         let reach = if count > 1 { reach(&options.paper) } else { height };
-        share_out(height, count, reach, chunks);
+        share_out(height, count, reach, chunks)?;
         let swept = chunks.last().map_or(0, |chunk| chunk.start + chunk.swept.len());
         radii.grow(swept * length)?;
         let depths = &depths[..length * height];
