@@ -477,6 +477,7 @@ namespace cross_check
         for (int method = 0; method < 4; ++method)
         {
           const Sum &s = sums_[method];
+          EXPECT_GT (s.normals, 0u) << name_ << ", " << METHODS[method];
           std::printf ("%-30s %10zu %10zu %6zu %8zu %7zu %7zu %7zu %8zu %8zu | %.6f %.6f", METHODS[method], s.compared,
                        s.normals, s.mask, s.undefined, s.lines, s.below_f32, s.judged, s.worse, s.off_by_one, s.p999, s.max);
           if (method == reference::COVARIANCE_MATRIX)

@@ -221,18 +221,8 @@ impl<'a> Points<'a> {
     #[inline(always)]
     pub fn at(&self, x: usize, y: usize) -> [f32; 3] {
         assert!(x < self.grid.width && y < self.grid.height);
-        // SAFETY: the pixel is inside the grid that the constructor vouched for.
-        unsafe { self.at_unchecked(x, y) }
-    }
-
-    /// The point at column `x`, row `y`.
-    ///
-    /// # Safety
-    /// `x < width` and `y < height`.
-    #[inline(always)]
-    pub(crate) unsafe fn at_unchecked(&self, x: usize, y: usize) -> [f32; 3] {
         let offset = self.grid.offset(x, y);
-        // SAFETY: promised by the caller; alignment was checked by the constructor.
+        // SAFETY: the pixel is inside the grid that the constructor vouched for, and alignment was checked there.
         unsafe {
             [
                 self.x.byte_add(offset).read(),

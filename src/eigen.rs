@@ -87,12 +87,6 @@ impl Scatter {
     }
 }
 
-/// The smallest eigenvalue of a positive semidefinite matrix that is not zero, and its unit eigenvector.
-pub(crate) fn smallest_eigenpair(m: &Symmetric3) -> (f64, [f64; 3]) {
-    let (values, vector) = eigen(m);
-    (values[0], vector)
-}
-
 /// The eigenvalues of a positive semidefinite matrix, ascending, and the unit eigenvector of the first.
 ///
 /// Cyclic Jacobi rotations: slow, and right to the last bits whatever the eigenvalues are.

@@ -9,12 +9,11 @@ use crate::fast::paper::{Along, Job, Own};
 use crate::fast::{self, SIZES, Scratch};
 use crate::isa::Isa;
 use crate::memory::{refill, resize};
-use crate::methods::{Estimate, estimate, estimate_window, start};
+use crate::methods::{Estimate, estimate_window, start};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
 use crate::paper::{
     self, Asked, Blocks, Cloud, DepthChanges, EvenWindows, Marks, PaperMaps, SecondPass, Windows,
-    with_missing_as_nan,
 };
 use crate::smoothing_area::window_side;
 use crate::threads::Workers;
@@ -266,7 +265,7 @@ impl Estimator {
 
     /// A copy of the points without zeros, where those are missing.
     fn without_zeros(&self, points: &Points) -> Result<Option<Vec<[f32; 3]>>, Error> {
-        let cleaned = || with_missing_as_nan(points, &self.options);
+        let cleaned = || Ok(Cloud::new(points, &self.options)?.points);
         self.options.zero_is_missing.then(cleaned).transpose()
     }
 
@@ -444,7 +443,7 @@ impl paper::Engine for Engine<'_> {
                 refill(sizes, (0..width * height).map(side))
             }
             (Semantics::Pcl, false) => {
-                fast::paper::depths(&job, scratch)?;
+                job.depths(scratch)?;
                 fast::sides(isa, points, options, sizes, scratch)
             }
             (_, true) => {
@@ -550,7 +549,8 @@ impl<'a> Plain<'a> {
         if side == 0 {
             return Estimate::NONE;
         }
-        let found = estimate(self.options.method, self.points, &self.image, (x, y), side);
+        let (points, image) = (self.points, &self.image);
+        let found = estimate_window(self.options.method, points, image, (x, y), (side, side));
         let point = self.points.at(x, y);
         let normal = turn_to_viewpoint(found.normal, point, self.options.viewpoint);
         Estimate { normal, ..found }

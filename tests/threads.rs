@@ -105,7 +105,8 @@ fn listed_pixels_get_what_the_whole_cloud_gives_them() {
             (0..pixels).map(|_| permuted[random.below(pixels.min(40))]).collect();
         let one = vec![permuted[0]];
         let last = vec![pixels as i32 - 1, 0, pixels as i32 - 1];
-        let all = methods().map(|method| options(method, 7.0, true)).chain(paper_options());
+        let all = methods().map(|method| options(method, 7.0, true));
+        let all = all.chain(paper_options()).chain(edge_options());
         for mut options in all {
             for isa in fast_isas().chain([Isa::Scalar]) {
                 for threads in [1, 3] {

@@ -112,8 +112,8 @@ pub unsafe extern "C" fn iine_estimator_compute(
 /// element k of `normals`, `normals->point_stride` bytes after element k - 1, belongs to indices[k] and equals
 /// what `iine_estimator_compute` gives for that pixel. A `count` of 0 does nothing, and `indices` may be NULL then.
 ///
-/// Errors: as `iine_estimator_compute`, and IINE_ERROR_INDEX if an index is outside the cloud. Nothing is
-/// written then.
+/// Errors: as `iine_estimator_compute`, also in what is written then, and IINE_ERROR_INDEX if an index is outside the
+/// cloud.
 ///
 /// # Safety
 /// As `iine_estimator_compute`; `indices` is NULL or valid for `count` reads, and no other thread writes to it.
@@ -186,7 +186,7 @@ pub unsafe extern "C" fn iine_estimator_compute_window(
 
 /// Computes the maps behind the normals: those whose pointers in `maps` are not NULL.
 ///
-/// They are those of the smoothing area map's own windows, whatever one-sided windows and crease windows make of them.
+/// The maps are those of the smoothing area map's own windows, whatever one-sided windows and crease windows make of them.
 /// A map must overlap neither another map nor the range of bytes from a coordinate's first pixel to its last.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_STRUCT_SIZE, IINE_ERROR_SIZE, IINE_ERROR_STRIDE,

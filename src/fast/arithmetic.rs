@@ -98,6 +98,12 @@ impl<S: Simd> Floats<S> {
         // SAFETY: there is a group, so there is the instruction set.
         unsafe { S::bits(S::lt(self.0, other.0)) }
     }
+
+    #[inline(always)]
+    pub fn widen(self) -> Doubles<S> {
+        // SAFETY: there is a group, so there is the instruction set.
+        Doubles(unsafe { S::widen(self.0) })
+    }
 }
 
 impl<S: Simd> Doubles<S> {
@@ -147,14 +153,6 @@ impl<S: Simd> Integers<S> {
     pub fn float(self) -> Floats<S> {
         // SAFETY: there is a group, so there is the instruction set.
         Floats(unsafe { S::float_i(self.0) })
-    }
-}
-
-impl<S: Simd> Floats<S> {
-    #[inline(always)]
-    pub fn widen(self) -> Doubles<S> {
-        // SAFETY: there is a group, so there is the instruction set.
-        Doubles(unsafe { S::widen(self.0) })
     }
 }
 

@@ -1,5 +1,5 @@
-//! Steps 4 and 5, fast, for one tile of the image: rows of points go through rings of sums, and every group of
-//! eight pixels takes its windows' sums from them.
+//! Steps 4 and 5, fast, for one tile of the image: rows of points go through rings of sums, every pair of groups of eight
+//! pixels takes its windows' sums from them, and normals are made run by run.
 
 use std::ops::{Range, RangeInclusive};
 
@@ -13,7 +13,7 @@ use super::windows::Sides;
 use crate::Error;
 use crate::cloud::Points;
 use crate::depth_change::is_depth_change;
-use crate::methods::{Estimate, estimate};
+use crate::methods::{Estimate, estimate_window};
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
 use crate::simd::{GROUP, Groups, Simd};
@@ -498,7 +498,8 @@ impl Tile<'_> {
         for lane in Bits(lanes) {
             let pixel = (x + lane, y);
             let side = row[pixel.0] as usize;
-            let found = estimate(self.options.method, self.points, self.image, pixel, side);
+            let (points, image) = (self.points, self.image);
+            let found = estimate_window(self.options.method, points, image, pixel, (side, side));
             let point = self.points.at(pixel.0, pixel.1);
             let normal = turn_to_viewpoint(found.normal, point, self.options.viewpoint);
             estimates.put(lane, Estimate { normal, ..found });
@@ -734,8 +735,6 @@ impl Estimates {
         }
     }
 }
-
-const _: () = assert!(MARGIN >= GROUP);
 
 /// Normals turned to the viewpoint: `orientation::turn_to_viewpoint`.
 ///

@@ -3,7 +3,7 @@
 
 use super::{Estimate, finite_point, start};
 use crate::cloud::Points;
-use crate::eigen::{Scatter, Symmetric3, smallest_eigenpair};
+use crate::eigen::{Scatter, Symmetric3, eigen};
 use crate::window::Image;
 
 /// The plain form: the matrix about the window's mean, in two passes.
@@ -28,6 +28,6 @@ fn from_covariance(covariance: &Symmetric3) -> Estimate {
     if trace == 0.0 {
         return Estimate { normal: [f32::NAN; 3], curvature: 0.0 };
     }
-    let (value, vector) = smallest_eigenpair(covariance);
-    Estimate { normal: vector.map(|c| c as f32), curvature: (value / trace) as f32 }
+    let (values, vector) = eigen(covariance);
+    Estimate { normal: vector.map(|c| c as f32), curvature: (values[0] / trace) as f32 }
 }

@@ -37,17 +37,6 @@ impl From<Estimate> for [f32; 4] {
     }
 }
 
-/// The estimate of pixel `(x, y)` from a window of `side` x `side` pixels, by walking over the window.
-pub(crate) fn estimate(
-    method: Method,
-    points: &Points,
-    image: &Image,
-    pixel: (usize, usize),
-    side: usize,
-) -> Estimate {
-    estimate_window(method, points, image, pixel, (side, side))
-}
-
 /// The estimate of pixel `(x, y)` from a window of any `size` (width, height), by walking over the window.
 pub(crate) fn estimate_window(
     method: Method,

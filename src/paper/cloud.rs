@@ -16,7 +16,7 @@ pub(crate) struct Cloud {
     pub height: usize,
     /// Whether depths are distances from the origin, not z.
     pub has_range: bool,
-    /// With some behind the last one, so that there are whole blocks of them.
+    /// With some behind the last one: whole blocks of them are read, and four floats of each.
     pub points: Vec<[f32; 3]>,
     pub depths: Vec<f32>,
     /// Block by block the sums of its points' coordinates, and their number; none where nothing is made from them.

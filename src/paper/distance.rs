@@ -3,7 +3,7 @@
 use std::iter::repeat_n;
 
 use crate::Error;
-use crate::memory::{refill, table};
+use crate::memory::table;
 use crate::options::DistanceMetric;
 
 /// The distance map of a depth change map; infinite everywhere if there is no change.
@@ -69,60 +69,41 @@ fn euclidean(changes: &[bool], width: usize, height: usize) -> Result<Vec<f32>, 
     Ok(map)
 }
 
-/// Steps with weights 3 and 4 (Borgefors, *Distance Transformations in Digital Images*, 1986), over 3.
+/// Steps with weights 3 and 4 (Borgefors, *Distance Transformations in Digital Images*, 1986), over 3: the least that lead
+/// to every pixel from a change, in two passes.
 fn chamfer(changes: &[bool], width: usize, height: usize) -> Result<Vec<f32>, Error> {
     const STRAIGHT: u32 = 3;
     const DIAGONAL: u32 = 4;
+    // Weights can be added to it.
     const FAR: u32 = u32::MAX / 2;
-    let pixels = |value: u32| {
-        if value >= FAR { f32::INFINITY } else { value as f32 / STRAIGHT as f32 }
-    };
-    let mut steps = Vec::new();
-    least_steps(&mut steps, changes, (width, height), FAR, STRAIGHT, DIAGONAL)?;
-    table(steps.into_iter().map(pixels))
-}
-
-#[inline(always)]
-fn step(to: &mut u32, from: u32, weight: u32) {
-    *to = (*to).min(from + weight);
-}
-
-/// Puts into a map the least weight of the steps along rows and columns and along diagonals that lead to every pixel from
-/// one of the `starts`, in two passes; `far` where it is more, to which weights can be added.
-fn least_steps(
-    map: &mut Vec<u32>,
-    starts: &[bool],
-    (width, height): (usize, usize),
-    far: u32,
-    straight: u32,
-    diagonal: u32,
-) -> Result<(), Error> {
-    refill(map, starts.iter().map(|&start| if start { 0 } else { far }))?;
+    let mut map = table(changes.iter().map(|&change| if change { 0 } else { FAR }))?;
+    let step = |to: &mut u32, from: u32, weight: u32| *to = (*to).min(from + weight);
     // The steps along a row, one way or the other.
     let along_step = |before: u32, to: &mut u32| {
-        step(to, before, straight);
+        step(to, before, STRAIGHT);
         *to
     };
     let from_next_row = |row: &mut [u32], next: &[u32]| {
-        row.iter_mut().zip(next).for_each(|(to, from)| step(to, *from, straight));
-        row[1..].iter_mut().zip(next).for_each(|(to, from)| step(to, *from, diagonal));
-        row.iter_mut().zip(&next[1..]).for_each(|(to, from)| step(to, *from, diagonal));
+        row.iter_mut().zip(next).for_each(|(to, from)| step(to, *from, STRAIGHT));
+        row[1..].iter_mut().zip(next).for_each(|(to, from)| step(to, *from, DIAGONAL));
+        row.iter_mut().zip(&next[1..]).for_each(|(to, from)| step(to, *from, DIAGONAL));
     };
     for y in 0..height {
         let (above, row) = map[..(y + 1) * width].split_at_mut(y * width);
         if y > 0 {
             from_next_row(row, &above[(y - 1) * width..]);
         }
-        row[..width].iter_mut().fold(far, along_step);
+        row.iter_mut().fold(FAR, along_step);
     }
     for y in (0..height).rev() {
         let (row, below) = map[y * width..].split_at_mut(width);
         if y + 1 < height {
             from_next_row(row, &below[..width]);
         }
-        row.iter_mut().rfold(far, along_step);
+        row.iter_mut().rfold(FAR, along_step);
     }
-    Ok(())
+    let pixels = |value| if value >= FAR { f32::INFINITY } else { value as f32 / STRAIGHT as f32 };
+    table(map.into_iter().map(pixels))
 }
 
 #[cfg(test)]

@@ -51,38 +51,24 @@ fn gradients(cloud: &impl CleanPoints, rect: &Rect) -> Estimate {
 /// one; here z is extended to the pixels that x and y span.
 fn smoothed_depth_changes(cloud: &impl CleanPoints, rect: &Rect) -> Estimate {
     let (column, row) = rect.middle();
-    let horizontal = {
-        let finite = |x: &usize| !cloud.at(*x, row)[2].is_nan();
-        let span = rect.x.clone().find(finite).zip(rect.x.clone().rev().find(finite));
-        tangent(cloud, rect, span.map(|(from, to)| ((from, row), (to, row), to - from)), (1, 0))
-    };
-    let vertical = {
-        let finite = |y: &usize| !cloud.at(column, *y)[2].is_nan();
-        let span = rect.y.clone().find(finite).zip(rect.y.clone().rev().find(finite));
-        tangent(
-            cloud,
-            rect,
-            span.map(|(from, to)| ((column, from), (column, to), to - from)),
-            (0, 1),
-        )
-    };
+    let horizontal = tangent(cloud, rect, &Rect { y: row..row + 1, ..rect.clone() }, (1, 0));
+    let vertical = tangent(cloud, rect, &Rect { x: column..column + 1, ..rect.clone() }, (0, 1));
     match horizontal.zip(vertical) {
         Some((horizontal, vertical)) => normal_of_tangents(vertical, horizontal),
         None => Estimate::NONE,
     }
 }
 
-/// Two pixels of a row or column, and how far apart they are.
-type Span = ((usize, usize), (usize, usize), usize);
-
-/// The tangent over a span: x and y from its ends, z from the mean difference across two pixels.
+/// The tangent along a line of a rectangle: x and y from its outermost points, z from the mean difference across two pixels.
 fn tangent(
     cloud: &impl CleanPoints,
     rect: &Rect,
-    span: Option<Span>,
+    line: &Rect,
     step: (usize, usize),
 ) -> Option<[f64; 3]> {
-    let (from, to, length) = span.filter(|(.., length)| *length > 0)?;
+    let mut there = line.pixels().filter(|(x, y)| !cloud.at(*x, *y)[2].is_nan());
+    let (from, to) = (there.next()?, there.last()?);
+    let length = to.0 - from.0 + to.1 - from.1;
     let slope = mean_difference(cloud, rect, step)?[2] / 2.0;
     let (from, to) = (cloud.at(from.0, from.1), cloud.at(to.0, to.1));
     let difference = |i: usize| f64::from(to[i]) - f64::from(from[i]);

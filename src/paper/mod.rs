@@ -99,14 +99,6 @@ impl PaperMaps {
     }
 }
 
-/// The points, row by row, with NaN for every missing one.
-pub(crate) fn with_missing_as_nan(
-    points: &Points,
-    options: &Options,
-) -> Result<Vec<[f32; 3]>, Error> {
-    Ok(Cloud::new(points, options)?.points)
-}
-
 /// The estimate of a pixel from the part of a window of any `size` that lies inside the image, not turned.
 pub(crate) fn estimate_window(
     points: &Points,

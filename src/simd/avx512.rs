@@ -20,16 +20,6 @@ pub(crate) struct Avx512Pair;
 /// What a pair's doubles are.
 type TwoGroups = Twice<Avx512>;
 
-/// Methods that call one function each.
-macro_rules! calls {
-    ($($name:ident($($operand:ident: $type:ty),*) $(-> $result:ty)? = $function:path;)*) => {
-        $(#[inline(always)]
-        unsafe fn $name($($operand: $type),*) $(-> $result)? {
-            unsafe { $function($($operand),*) }
-        })*
-    };
-}
-
 impl Simd for Avx512 {
     const LANES: usize = GROUP;
     type F = __m256;

@@ -22,6 +22,22 @@ macro_rules! each {
     (4 $op:path, $($operand:expr),+) => { each!([0 1 2 3] $op, $($operand),+) };
 }
 
+/// Methods that call one function each, of all of a group or, `of N` registers, of each.
+macro_rules! calls {
+    (of $n:tt: $($name:ident($($operand:ident: $type:ty),*) -> $result:ty = $function:path;)*) => {
+        $(#[inline(always)]
+        unsafe fn $name($($operand: $type),*) -> $result {
+            unsafe { each!($n $function, $($operand),*) }
+        })*
+    };
+    ($($name:ident($($operand:ident: $type:ty),*) $(-> $result:ty)? = $function:path;)*) => {
+        $(#[inline(always)]
+        unsafe fn $name($($operand: $type),*) $(-> $result)? {
+            unsafe { $function($($operand),*) }
+        })*
+    };
+}
+
 pub(crate) mod portable;
 #[cfg(test)]
 mod tests;

@@ -33,6 +33,28 @@ impl Simd for Neon {
     type I = [int32x4_t; 2];
     type D = [float64x2_t; 4];
 
+    calls! {
+        store_points(fields: [Self::F; 4], place: usize, first: *mut f32, step: usize) = store_points_by_lanes::<Self>;
+    }
+
+    calls! { of 2:
+        add(a: Self::F, b: Self::F) -> Self::F = vaddq_f32;
+        sub(a: Self::F, b: Self::F) -> Self::F = vsubq_f32;
+        mul(a: Self::F, b: Self::F) -> Self::F = vmulq_f32;
+        div(a: Self::F, b: Self::F) -> Self::F = vdivq_f32;
+        sqrt(a: Self::F) -> Self::F = vsqrtq_f32;
+        add_i(a: Self::I, b: Self::I) -> Self::I = vaddq_s32;
+        sub_i(a: Self::I, b: Self::I) -> Self::I = vsubq_s32;
+    }
+
+    calls! { of 4:
+        add_d(a: Self::D, b: Self::D) -> Self::D = vaddq_f64;
+        sub_d(a: Self::D, b: Self::D) -> Self::D = vsubq_f64;
+        mul_d(a: Self::D, b: Self::D) -> Self::D = vmulq_f64;
+        div_d(a: Self::D, b: Self::D) -> Self::D = vdivq_f64;
+        sqrt_d(a: Self::D) -> Self::D = vsqrtq_f64;
+    }
+
     #[inline(always)]
     unsafe fn splat(value: f32) -> Self::F {
         unsafe { [vdupq_n_f32(value); 2] }
@@ -47,26 +69,6 @@ impl Simd for Neon {
             vst1q_f32(to, value[0]);
             vst1q_f32(to.add(4), value[1]);
         }
-    }
-    #[inline(always)]
-    unsafe fn add(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(2 vaddq_f32, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn sub(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(2 vsubq_f32, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn mul(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(2 vmulq_f32, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn div(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(2 vdivq_f32, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn sqrt(a: Self::F) -> Self::F {
-        unsafe { each!(2 vsqrtq_f32, a) }
     }
     #[inline(always)]
     unsafe fn min(a: Self::F, b: Self::F) -> Self::F {
@@ -136,14 +138,6 @@ impl Simd for Neon {
         unsafe { [vdupq_n_s32(value); 2] }
     }
     #[inline(always)]
-    unsafe fn add_i(a: Self::I, b: Self::I) -> Self::I {
-        unsafe { each!(2 vaddq_s32, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn sub_i(a: Self::I, b: Self::I) -> Self::I {
-        unsafe { each!(2 vsubq_s32, a, b) }
-    }
-    #[inline(always)]
     unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
         unsafe { each!(2 vbslq_s32, lane_masks(lanes), yes, no) }
     }
@@ -180,26 +174,6 @@ impl Simd for Neon {
         for (i, half) in value.into_iter().enumerate() {
             unsafe { vst1q_f64(to.add(2 * i), half) };
         }
-    }
-    #[inline(always)]
-    unsafe fn add_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(4 vaddq_f64, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn sub_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(4 vsubq_f64, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn mul_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(4 vmulq_f64, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn div_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(4 vdivq_f64, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn sqrt_d(a: Self::D) -> Self::D {
-        unsafe { each!(4 vsqrtq_f64, a) }
     }
     #[inline(always)]
     unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D {
@@ -251,10 +225,6 @@ impl Simd for Neon {
     #[inline(always)]
     unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
         unsafe { load_points_by_fours::<Self>(first, step) }
-    }
-    #[inline(always)]
-    unsafe fn store_points(fields: [Self::F; 4], place: usize, first: *mut f32, step: usize) {
-        unsafe { store_points_by_lanes::<Self>(fields, place, first, step) }
     }
 }
 

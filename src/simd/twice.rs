@@ -6,7 +6,7 @@ use super::Simd;
 #[derive(Clone, Copy)]
 pub(crate) struct Twice<S>(std::marker::PhantomData<S>);
 
-macro_rules! each {
+macro_rules! both {
     ($($name:ident($($operand:ident: $type:ident),*) -> $result:ident;)*) => {
         $(#[inline(always)]
         unsafe fn $name($($operand: Self::$type),*) -> Self::$result {
@@ -22,7 +22,7 @@ impl<S: Simd> Simd for Twice<S> {
     type I = [S::I; 2];
     type D = [S::D; 2];
 
-    each! {
+    both! {
         add(a: F, b: F) -> F;
         sub(a: F, b: F) -> F;
         mul(a: F, b: F) -> F;

@@ -60,6 +60,33 @@ impl Simd for Sse2 {
     type I = [__m128i; 2];
     type D = [__m128d; 4];
 
+    calls! { of 2:
+        add(a: Self::F, b: Self::F) -> Self::F = _mm_add_ps;
+        sub(a: Self::F, b: Self::F) -> Self::F = _mm_sub_ps;
+        mul(a: Self::F, b: Self::F) -> Self::F = _mm_mul_ps;
+        div(a: Self::F, b: Self::F) -> Self::F = _mm_div_ps;
+        sqrt(a: Self::F) -> Self::F = _mm_sqrt_ps;
+        min(a: Self::F, b: Self::F) -> Self::F = _mm_min_ps;
+        max(a: Self::F, b: Self::F) -> Self::F = _mm_max_ps;
+        lt(a: Self::F, b: Self::F) -> Self::F = _mm_cmplt_ps;
+        eq(a: Self::F, b: Self::F) -> Self::F = _mm_cmpeq_ps;
+        and(a: Self::F, b: Self::F) -> Self::F = _mm_and_ps;
+        or(a: Self::F, b: Self::F) -> Self::F = _mm_or_ps;
+        xor(a: Self::F, b: Self::F) -> Self::F = _mm_xor_ps;
+        and_not(mask: Self::F, a: Self::F) -> Self::F = _mm_andnot_ps;
+        add_i(a: Self::I, b: Self::I) -> Self::I = _mm_add_epi32;
+        sub_i(a: Self::I, b: Self::I) -> Self::I = _mm_sub_epi32;
+    }
+
+    calls! { of 4:
+        add_d(a: Self::D, b: Self::D) -> Self::D = _mm_add_pd;
+        sub_d(a: Self::D, b: Self::D) -> Self::D = _mm_sub_pd;
+        mul_d(a: Self::D, b: Self::D) -> Self::D = _mm_mul_pd;
+        div_d(a: Self::D, b: Self::D) -> Self::D = _mm_div_pd;
+        sqrt_d(a: Self::D) -> Self::D = _mm_sqrt_pd;
+        max_d(a: Self::D, b: Self::D) -> Self::D = _mm_max_pd;
+    }
+
     #[inline(always)]
     unsafe fn splat(value: f32) -> Self::F {
         unsafe { [_mm_set1_ps(value); 2] }
@@ -74,58 +101,6 @@ impl Simd for Sse2 {
             _mm_storeu_ps(to, value[0]);
             _mm_storeu_ps(to.add(4), value[1]);
         }
-    }
-    #[inline(always)]
-    unsafe fn add(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(2 _mm_add_ps, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn sub(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(2 _mm_sub_ps, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn mul(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(2 _mm_mul_ps, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn div(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(2 _mm_div_ps, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn sqrt(a: Self::F) -> Self::F {
-        unsafe { each!(2 _mm_sqrt_ps, a) }
-    }
-    #[inline(always)]
-    unsafe fn min(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(2 _mm_min_ps, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn max(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(2 _mm_max_ps, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn lt(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(2 _mm_cmplt_ps, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn eq(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(2 _mm_cmpeq_ps, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn and(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(2 _mm_and_ps, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn or(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(2 _mm_or_ps, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn xor(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { each!(2 _mm_xor_ps, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn and_not(mask: Self::F, a: Self::F) -> Self::F {
-        unsafe { each!(2 _mm_andnot_ps, mask, a) }
     }
     #[inline(always)]
     unsafe fn bits(mask: Self::F) -> u32 {
@@ -146,14 +121,6 @@ impl Simd for Sse2 {
     #[inline(always)]
     unsafe fn splat_i(value: i32) -> Self::I {
         unsafe { [_mm_set1_epi32(value); 2] }
-    }
-    #[inline(always)]
-    unsafe fn add_i(a: Self::I, b: Self::I) -> Self::I {
-        unsafe { each!(2 _mm_add_epi32, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn sub_i(a: Self::I, b: Self::I) -> Self::I {
-        unsafe { each!(2 _mm_sub_epi32, a, b) }
     }
     #[inline(always)]
     unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
@@ -196,30 +163,6 @@ impl Simd for Sse2 {
         for (i, half) in value.into_iter().enumerate() {
             unsafe { _mm_storeu_pd(to.add(2 * i), half) };
         }
-    }
-    #[inline(always)]
-    unsafe fn add_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(4 _mm_add_pd, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn sub_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(4 _mm_sub_pd, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn mul_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(4 _mm_mul_pd, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn div_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(4 _mm_div_pd, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn sqrt_d(a: Self::D) -> Self::D {
-        unsafe { each!(4 _mm_sqrt_pd, a) }
-    }
-    #[inline(always)]
-    unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(4 _mm_max_pd, a, b) }
     }
     #[inline(always)]
     unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32 {
@@ -423,70 +366,40 @@ impl Simd for Avx2 {
     type I = __m256i;
     type D = [__m256d; 2];
 
-    #[inline(always)]
-    unsafe fn splat(value: f32) -> Self::F {
-        unsafe { _mm256_set1_ps(value) }
+    calls! {
+        splat(value: f32) -> Self::F = _mm256_set1_ps;
+        load(from: *const f32) -> Self::F = _mm256_loadu_ps;
+        store(to: *mut f32, value: Self::F) = _mm256_storeu_ps;
+        add(a: Self::F, b: Self::F) -> Self::F = _mm256_add_ps;
+        sub(a: Self::F, b: Self::F) -> Self::F = _mm256_sub_ps;
+        mul(a: Self::F, b: Self::F) -> Self::F = _mm256_mul_ps;
+        div(a: Self::F, b: Self::F) -> Self::F = _mm256_div_ps;
+        sqrt(a: Self::F) -> Self::F = _mm256_sqrt_ps;
+        min(a: Self::F, b: Self::F) -> Self::F = _mm256_min_ps;
+        max(a: Self::F, b: Self::F) -> Self::F = _mm256_max_ps;
+        lt(a: Self::F, b: Self::F) -> Self::F = _mm256_cmp_ps::<_CMP_LT_OQ>;
+        eq(a: Self::F, b: Self::F) -> Self::F = _mm256_cmp_ps::<_CMP_EQ_OQ>;
+        and(a: Self::F, b: Self::F) -> Self::F = _mm256_and_ps;
+        or(a: Self::F, b: Self::F) -> Self::F = _mm256_or_ps;
+        xor(a: Self::F, b: Self::F) -> Self::F = _mm256_xor_ps;
+        and_not(mask: Self::F, a: Self::F) -> Self::F = _mm256_andnot_ps;
+        splat_i(value: i32) -> Self::I = _mm256_set1_epi32;
+        add_i(a: Self::I, b: Self::I) -> Self::I = _mm256_add_epi32;
+        sub_i(a: Self::I, b: Self::I) -> Self::I = _mm256_sub_epi32;
+        round_i(a: Self::F) -> Self::I = _mm256_cvtps_epi32;
+        truncate_i(a: Self::F) -> Self::I = _mm256_cvttps_epi32;
+        float_i(a: Self::I) -> Self::F = _mm256_cvtepi32_ps;
     }
-    #[inline(always)]
-    unsafe fn load(from: *const f32) -> Self::F {
-        unsafe { _mm256_loadu_ps(from) }
+
+    calls! { of 2:
+        add_d(a: Self::D, b: Self::D) -> Self::D = _mm256_add_pd;
+        sub_d(a: Self::D, b: Self::D) -> Self::D = _mm256_sub_pd;
+        mul_d(a: Self::D, b: Self::D) -> Self::D = _mm256_mul_pd;
+        div_d(a: Self::D, b: Self::D) -> Self::D = _mm256_div_pd;
+        sqrt_d(a: Self::D) -> Self::D = _mm256_sqrt_pd;
+        max_d(a: Self::D, b: Self::D) -> Self::D = _mm256_max_pd;
     }
-    #[inline(always)]
-    unsafe fn store(to: *mut f32, value: Self::F) {
-        unsafe { _mm256_storeu_ps(to, value) }
-    }
-    #[inline(always)]
-    unsafe fn add(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { _mm256_add_ps(a, b) }
-    }
-    #[inline(always)]
-    unsafe fn sub(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { _mm256_sub_ps(a, b) }
-    }
-    #[inline(always)]
-    unsafe fn mul(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { _mm256_mul_ps(a, b) }
-    }
-    #[inline(always)]
-    unsafe fn div(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { _mm256_div_ps(a, b) }
-    }
-    #[inline(always)]
-    unsafe fn sqrt(a: Self::F) -> Self::F {
-        unsafe { _mm256_sqrt_ps(a) }
-    }
-    #[inline(always)]
-    unsafe fn min(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { _mm256_min_ps(a, b) }
-    }
-    #[inline(always)]
-    unsafe fn max(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { _mm256_max_ps(a, b) }
-    }
-    #[inline(always)]
-    unsafe fn lt(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { _mm256_cmp_ps::<_CMP_LT_OQ>(a, b) }
-    }
-    #[inline(always)]
-    unsafe fn eq(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { _mm256_cmp_ps::<_CMP_EQ_OQ>(a, b) }
-    }
-    #[inline(always)]
-    unsafe fn and(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { _mm256_and_ps(a, b) }
-    }
-    #[inline(always)]
-    unsafe fn or(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { _mm256_or_ps(a, b) }
-    }
-    #[inline(always)]
-    unsafe fn xor(a: Self::F, b: Self::F) -> Self::F {
-        unsafe { _mm256_xor_ps(a, b) }
-    }
-    #[inline(always)]
-    unsafe fn and_not(mask: Self::F, a: Self::F) -> Self::F {
-        unsafe { _mm256_andnot_ps(mask, a) }
-    }
+
     #[inline(always)]
     unsafe fn bits(mask: Self::F) -> u32 {
         unsafe { _mm256_movemask_ps(mask) as u32 }
@@ -511,32 +424,8 @@ impl Simd for Avx2 {
         unsafe { _mm256_storeu_si256(to.cast(), value) }
     }
     #[inline(always)]
-    unsafe fn splat_i(value: i32) -> Self::I {
-        unsafe { _mm256_set1_epi32(value) }
-    }
-    #[inline(always)]
-    unsafe fn add_i(a: Self::I, b: Self::I) -> Self::I {
-        unsafe { _mm256_add_epi32(a, b) }
-    }
-    #[inline(always)]
-    unsafe fn sub_i(a: Self::I, b: Self::I) -> Self::I {
-        unsafe { _mm256_sub_epi32(a, b) }
-    }
-    #[inline(always)]
     unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
         unsafe { _mm256_blendv_epi8(no, yes, _mm256_castps_si256(Self::mask(lanes))) }
-    }
-    #[inline(always)]
-    unsafe fn round_i(a: Self::F) -> Self::I {
-        unsafe { _mm256_cvtps_epi32(a) }
-    }
-    #[inline(always)]
-    unsafe fn truncate_i(a: Self::F) -> Self::I {
-        unsafe { _mm256_cvttps_epi32(a) }
-    }
-    #[inline(always)]
-    unsafe fn float_i(a: Self::I) -> Self::F {
-        unsafe { _mm256_cvtepi32_ps(a) }
     }
 
     #[inline(always)]
@@ -553,30 +442,6 @@ impl Simd for Avx2 {
             _mm256_storeu_pd(to, value[0]);
             _mm256_storeu_pd(to.add(4), value[1]);
         }
-    }
-    #[inline(always)]
-    unsafe fn add_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(2 _mm256_add_pd, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn sub_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(2 _mm256_sub_pd, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn mul_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(2 _mm256_mul_pd, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn div_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(2 _mm256_div_pd, a, b) }
-    }
-    #[inline(always)]
-    unsafe fn sqrt_d(a: Self::D) -> Self::D {
-        unsafe { each!(2 _mm256_sqrt_pd, a) }
-    }
-    #[inline(always)]
-    unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D {
-        unsafe { each!(2 _mm256_max_pd, a, b) }
     }
     #[inline(always)]
     unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32 {

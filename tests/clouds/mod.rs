@@ -327,13 +327,21 @@ pub fn paper_options() -> Vec<Options> {
 pub fn edge_options() -> Vec<Options> {
     let mut all = Vec::new();
     for semantics in [Semantics::Paper, Semantics::Pcl] {
-        for [one_sided, crease] in [[true, false], [false, true], [true, true]] {
-            let mut options = Options::default();
-            options.semantics = semantics;
-            options.method = Method::CovarianceMatrix;
-            options.one_sided_windows = one_sided;
-            options.crease_windows = crease;
-            all.push(options);
+        for method in Method::ALL {
+            if semantics == Semantics::Paper && method == Method::Simple3DGradient {
+                continue; // not the paper's
+            }
+            // What tells the windows is the same for all methods.
+            let one_of_both = [[true, false], [false, true]].into_iter();
+            let one_of_both = one_of_both.filter(|_| method == Method::CovarianceMatrix);
+            for [one_sided, crease] in one_of_both.chain([[true, true]]) {
+                let mut options = Options::default();
+                options.semantics = semantics;
+                options.method = method;
+                options.one_sided_windows = one_sided;
+                options.crease_windows = crease;
+                all.push(options);
+            }
         }
     }
     all

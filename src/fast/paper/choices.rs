@@ -334,7 +334,6 @@ impl<S: Along> Found<'_, S> {
     ) {
         const { assert!(size_of::<EvenWindow>() == size_of::<[f32; 12]>()) };
         let place = |lane: usize| columns.first[lane] + rows.first[lane];
-        debug_assert!((0..S::LANES).all(|lane| place(lane) < windows.len()));
         let windows = windows.as_ptr();
         let to = &mut self.candidates[self.number];
         self.number += 1;

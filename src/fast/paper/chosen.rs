@@ -4,10 +4,11 @@
 use crate::cloud::{Normals, Points};
 use crate::fast::arithmetic::Floats;
 use crate::fast::lanes::LANES;
+use crate::fast::paths::Task;
 use crate::fast::tile::{Bits, all, turned};
 use crate::options::Options;
 use crate::paper::{Cloud, NO_WINDOW, SecondPass, marks_from};
-use crate::simd::{Along, load_by_fours};
+use crate::simd::{Along, Groups, load_by_fours};
 
 /// A row of pixels, some of which take even windows.
 pub(super) struct ChosenRow<'a> {
@@ -20,15 +21,23 @@ pub(super) struct ChosenRow<'a> {
     pub of_left: Option<&'a Points<'a>>,
 }
 
-impl ChosenRow<'_> {
-    /// Writes them; the others stay as they are, but with one-sided windows those without a normal get one from the points
-    /// around them.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`; the row is inside the normals, all of which were written, and no other
-    /// thread writes it.
+/// Writes them; the others stay as they are, but with one-sided windows those without a normal get one from the points
+/// around them. It asks that the row is inside the normals, all of which were written, and that no other thread writes it.
+impl Task for ChosenRow<'_> {
+    type Output = ();
+
     #[inline(always)]
-    pub unsafe fn write<S: Along>(&self) {
+    unsafe fn run<S: Groups>(self) {
+        // SAFETY: as the caller's.
+        unsafe { self.write::<S::Widest>() };
+    }
+}
+
+impl ChosenRow<'_> {
+    /// # Safety
+    /// As the task's.
+    #[inline(always)]
+    unsafe fn write<S: Along>(&self) {
         let &ChosenRow { cloud, options, second_pass, y, of_left, .. } = self;
         let first = y * cloud.width;
         let choices = &second_pass.choices()[first..][..cloud.width];

@@ -2,9 +2,10 @@
 
 use crate::cloud::{PointRow, Points};
 use crate::fast::lanes::{LANES, Lanes};
+use crate::fast::paths::Task;
 use crate::options::{Depth, Options};
 use crate::paper::BLOCK;
-use crate::simd::{Along, load_by_fours};
+use crate::simd::{Along, Groups, load_by_fours};
 
 /// Elements of a row of depths: the width, and a pair of groups of NaN or more behind it.
 pub(crate) fn row_length(width: usize) -> usize {
@@ -56,6 +57,9 @@ pub(crate) struct PointRows<'a> {
     pub sums: &'a mut [[f32; 4]],
     /// Room for sums down the columns, as [`room_for_columns`] says.
     pub columns: &'a mut [f32],
+    pub options: &'a Options,
+    /// Whether depths are distances from the origin.
+    pub range: bool,
 }
 
 /// What [`PointRows::columns`] holds for blocks of this number.
@@ -63,15 +67,23 @@ pub(crate) fn room_for_columns(across: usize) -> usize {
     4 * BLOCK * across.next_multiple_of(LANES)
 }
 
+/// Reads points and their depths, and sums the blocks if that is asked for.
+impl Task for PointRows<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    unsafe fn run<S: Groups>(self) {
+        // SAFETY: as the caller's.
+        unsafe { self.read::<S::Widest>() };
+    }
+}
+
 impl PointRows<'_> {
-    /// Reads points and their depths, distances from the origin where `range` says so, and sums the blocks if that is asked
-    /// for.
-    ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn read<S: Along>(self, options: &Options, range: bool) {
-        let PointRows { rows, sums, columns } = self;
+    unsafe fn read<S: Along>(self) {
+        let PointRows { rows, sums, columns, options, range } = self;
         let columns = &mut columns[..room_for_columns(sums.len())];
         let plane = columns.len() / 4;
         columns.fill(0.0);

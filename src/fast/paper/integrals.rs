@@ -10,7 +10,6 @@ use crate::cloud::Points;
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::fast::buffer::Buffer;
 use crate::fast::lanes::LANES;
-use crate::paper::BLOCK;
 use crate::simd::{Along, GROUP, Groups};
 
 /// x, y, z, and the weight: 1, or next to nothing for a hidden point (`layers`); 0 for a missing one, whose coordinates are
@@ -115,7 +114,7 @@ impl<const N: usize> Rings<N> {
 
     /// Makes room for so many elements.
     pub fn reserve(&mut self, elements: usize) -> Result<(), Error> {
-        self.points.grow(size_of::<Counted>() / size_of::<f32>() * (elements + BLOCK * GROUP))?;
+        self.points.grow(size_of::<Counted>() / size_of::<f32>() * elements)?;
         self.eights.grow(usize::from(Self::HAS_EIGHT) * elements)?;
         self.fours.grow(usize::from(Self::HAS_FOUR) * elements)?;
         self.pairs.grow(usize::from(Self::HAS_PAIR) * elements)
@@ -258,12 +257,11 @@ impl<const N: usize> Rings<N> {
             // SAFETY: as the caller's.
             return unsafe { row.at(self.place(x)).own(field) };
         }
-        debug_assert!(step <= BLOCK);
         let first = row.own.wrapping_add(field * row.plane);
         let mut eight = [0.0; GROUP];
         for (lane, to) in eight.iter_mut().enumerate() {
             let place = self.place((x + lane * step).min(width - 1));
-            // SAFETY: behind the last row there is room for so many.
+            // SAFETY: the pixels are in the tile, whose columns are held.
             *to = unsafe { *first.wrapping_add(place) };
         }
         // SAFETY: as the caller's.

@@ -120,11 +120,6 @@ pub(crate) fn compute(
     job.tiles(scratch, indices, normals, scratch.paper.largest, 1, None)
 }
 
-/// Reads the depths for [`even_windows`] and [`compute_of_blocks`].
-pub(crate) fn depths(job: &Job, scratch: &mut super::Scratch) -> Result<(), Error> {
-    job.depths(scratch)
-}
-
 /// Reads the depths, and finds the radii of all pixels' windows, row by row, 0 for none.
 pub(crate) fn radii(
     job: &Job,
@@ -179,7 +174,7 @@ pub(crate) fn write_chosen(
     workers.for_each(cloud.height, |_, y| {
         let row = ChosenRow { cloud, options, second_pass, normals, y, of_left };
         // SAFETY: the processor has the instruction set, and every row falls to one thread.
-        unsafe { paths::run(job.isa, ChosenTask { row }) };
+        unsafe { paths::run(job.isa, row) };
     });
 }
 
@@ -220,9 +215,9 @@ pub(crate) fn read_cloud(
             let mut rows = rows.map(|(line, (to, depths))| {
                 (points.row(row * BLOCK + line, 0..width, whole_points), to, depths)
             });
-            let rows = PointRows { rows: &mut rows, sums, columns };
+            let rows = PointRows { rows: &mut rows, sums, columns, options, range: has_range };
             // SAFETY: the processor has the instruction set.
-            unsafe { paths::run(isa, PointsTask { rows, options, range: has_range }) };
+            unsafe { paths::run(isa, rows) };
         }
     });
     Ok(())
@@ -405,9 +400,9 @@ pub(crate) struct Job<'a> {
 
 // The stages are not inlined: profiles and the test of instruction counts tell them by name.
 impl Job<'_> {
-    /// All rows of depths.
+    /// All rows of depths, for [`even_windows`] and [`compute_of_blocks`] too.
     #[inline(never)]
-    fn depths(&self, scratch: &mut super::Scratch) -> Result<(), Error> {
+    pub fn depths(&self, scratch: &mut super::Scratch) -> Result<(), Error> {
         let &Job { points, options, whole_points, .. } = self;
         scratch.prepare(options.threads)?;
         let super::Scratch { workers, paper, .. } = scratch;
@@ -653,24 +648,6 @@ impl Task for DepthsTask<'_> {
     }
 }
 
-/// Rows of points and depths.
-struct PointsTask<'a> {
-    rows: PointRows<'a>,
-    options: &'a Options,
-    range: bool,
-}
-
-impl Task for PointsTask<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<S: Groups>(self) {
-        let PointsTask { rows, options, range } = self;
-        // SAFETY: as the caller's.
-        unsafe { rows.read::<S::Widest>(options, range) };
-    }
-}
-
 /// The depth changes of a row.
 struct ChangesTask<'a> {
     depths: [&'a [f32]; 2],
@@ -686,21 +663,6 @@ impl Task for ChangesTask<'_> {
         let ChangesTask { depths, options, marks } = self;
         // SAFETY: as the caller's.
         unsafe { depth_changes::between::<S::Widest>(depths, options, marks) }
-    }
-}
-
-/// A row of pixels some of which take even windows; no one else writes it.
-struct ChosenTask<'a> {
-    row: ChosenRow<'a>,
-}
-
-impl Task for ChosenTask<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<S: Groups>(self) {
-        // SAFETY: as the caller's.
-        unsafe { self.row.write::<S::Widest>() };
     }
 }
 
