@@ -437,7 +437,7 @@ fn generated_clouds_match_the_equations() {
     for (seed, kind) in (0..).zip(Kind::ALL) {
         let mut differences = Differences::default();
         for (i, mut options) in option_sets().into_iter().enumerate() {
-            if kind == Kind::Millimetres {
+            if matches!(kind, Kind::Millimetres | Kind::MixedUnits) {
                 options.paper.alpha *= 1e-3;
                 options.paper.beta *= 1e-3;
             }

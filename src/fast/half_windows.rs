@@ -277,7 +277,8 @@ impl<T: Depth> Sums for HalfWindows<T> {
             // And where they say that the tangents are parallel, there is no normal: n / |n| is NaN then.
             let zero = Floats::splat(0.0);
             let parallel = !(zero.lt(n[0].abs().max(n[1].abs()).max(n[2].abs())));
-            let floats_decide = least.lt(n2) | parallel & least.lt(h2) & least.lt(v2);
+            let is_long = least.lt(n2) & n2.lt(Floats::splat(f32::INFINITY));
+            let floats_decide = is_long | parallel & least.lt(h2) & least.lt(v2);
             let floats_decide = smallest & floats_decide;
             let scale = Floats::splat(1.0) / n2.sqrt();
             Found {

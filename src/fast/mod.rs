@@ -1,9 +1,9 @@
 //! The fast form of the whole method: the same steps as the plain form, over lanes, rows and tiles.
 //!
 //! First the windows of a slice of the image's rows (`windows`), then tile by tile, and if need be layer by layer
-//! (`layers`), the points (`planes`), the method's rings of sums (`strip_pairs`, `strips`, `moments`, `half_windows`) and,
-//! run by run (`run`), the normals (`tile`). Slices are made of whole strips; strips, tiles and layers are fixed by the
-//! frame and the options, so that results do not depend on the number of threads.
+//! (`layers`), the points (`planes`, `hidden`), the method's rings of sums (`strip_pairs`, `strips`, `moments`,
+//! `half_windows`) and, run by run (`run`), the normals (`tile`). Slices are made of whole strips; strips, tiles and layers
+//! are fixed by the frame and the options, so that results do not depend on the number of threads.
 
 mod arithmetic;
 mod buffer;
@@ -11,6 +11,7 @@ mod by_side;
 mod depth;
 mod gradients;
 mod half_windows;
+mod hidden;
 mod lanes;
 mod layers;
 mod moments;

@@ -9,7 +9,9 @@ use super::run::{Noted, OfRun, RUN};
 use super::tile::{Bits, Found, Pair, Sums, Tile};
 use crate::Error;
 use crate::cloud::Points;
+use crate::eigen::{Symmetric3, eigen};
 use crate::memory::{bytes, make_room};
+use crate::methods::Estimate;
 use crate::paper::ROUNDING;
 use crate::simd::{GROUP, Groups, Simd};
 use crate::window::Image;
@@ -87,6 +89,12 @@ const CONVERGED: f32 = 1e-3;
 
 /// A normal is doubtful if the error of the sums could turn it by more than 3e-5.
 const DOUBT_SUMS: f64 = 3e4;
+
+/// In doubles, if it could turn it by more than 1e-5.
+const DOUBT_PRECISE: f64 = 1e5;
+
+/// How much larger than the trace a window's own sums about one of its points are at most, but for a few.
+const OWN_SUMS: f64 = 4.0;
 
 /// The least product of the smallest eigenvalue's distances from the others (of a matrix of trace 1): the rounding of
 /// the determinant, some 1e-16, over its square turns the normal.
@@ -408,6 +416,17 @@ impl Sums for Moments {
         // SAFETY: as the caller's.
         unsafe { run.normals(at, if fresh { 0.0 } else { self.error }) }
     }
+
+    fn precisely(
+        &self,
+        _tile: &Tile,
+        _window: ((usize, usize), usize),
+        run: &Matrices,
+        at: usize,
+        fresh: bool,
+    ) -> Option<Estimate> {
+        run.precisely(at, if fresh { 0.0 } else { self.error })
+    }
 }
 
 /// The covariance matrices of a run's windows (Eq. 25), over their traces, and the smallest eigenvalues.
@@ -505,6 +524,20 @@ impl Matrices {
                 self.note::<S>(&WindowMoments { sums: of8, share }, at + group);
             }
         }
+    }
+
+    /// The estimate of the pixel that is `at` in the run, in doubles; none if the moments' rounding errors, which stay below
+    /// `error`, leave it doubtful.
+    #[cold]
+    pub fn precisely(&self, at: usize, error: f64) -> Option<Estimate> {
+        let [xx, xy, xz, yy, yz, zz] = self.elements.of_one(at);
+        let (values, vector) = eigen(&Symmetric3 { xx, xy, xz, yy, yz, zz });
+        // The matrix is over this, which may be rounding alone.
+        let trace = f64::from(self.trace.of_one(at)[0]);
+        let error = error + OWN_SUMS * ROUNDING * trace;
+        let curvature = (values[0] / (xx + yy + zz)) as f32;
+        (DOUBT_PRECISE * error < (values[1] - values[0]) * trace)
+            .then(|| Estimate { normal: vector.map(|c| c as f32), curvature })
     }
 
     /// From what is near the least roots to these; returns the lanes whose steps have not ended.

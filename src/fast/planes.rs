@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::buffer::{Buffer, Number};
+use super::hidden::Hidden;
 use super::lanes::LANES;
 use super::run::Lane;
 use crate::Error;
@@ -141,25 +142,19 @@ pub(crate) unsafe fn sum_between<S: Simd, T: Lane>(ring: *const T, corners: &Cor
 #[derive(Debug, Default)]
 pub(crate) struct Planes {
     data: Buffer<f32>,
-}
-
-/// What a row of points was like.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct RowNews {
-    /// A point that is held has a finite z but not a finite x or y: no depth change tells of it.
-    pub hidden: bool,
-    /// The largest magnitude of x or y of a point that is held, or of the filler.
-    pub largest: f32,
+    /// Of the points that were read.
+    pub hidden: Hidden,
 }
 
 impl Planes {
     /// Makes room for frames that are no larger.
     pub fn reserve(&mut self, frame: &Frame) -> Result<(), Error> {
-        self.data.grow(frame.start_of(3, frame.ring))
+        self.data.grow(frame.start_of(3, frame.ring))?;
+        self.hidden.reserve(frame)
     }
 
     pub fn size(&self) -> usize {
-        self.data.size()
+        self.data.size() + self.hidden.size()
     }
 
     /// The ring, for groups here and there, each of which a slice would check.
@@ -182,7 +177,7 @@ impl Planes {
     }
 
     /// Reads row `y` of the points, with `filler` for missing ones and those whose depths' magnitudes are not between
-    /// these.
+    /// these. Returns the largest magnitude of x or y of a point that is held, or of the filler.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
@@ -193,29 +188,29 @@ impl Planes {
         frame: &Frame,
         y: usize,
         whole_points: bool,
-        [least, largest]: [f32; 2],
+        held: [f32; 2],
         filler: [f32; 3],
-    ) -> RowNews {
+    ) -> f32 {
         let start = frame.start(3, y);
         let row = &mut self.data[start..start + 3 * frame.stride];
         assert!(MARGIN + frame.steps::<S>() * S::LANES <= frame.stride);
-        let points = points.row(y, frame.columns.clone(), whole_points);
+        let points_of_row = points.row(y, frame.columns.clone(), whole_points);
         let xs = row[MARGIN..].as_mut_ptr();
         // SAFETY: as the caller's; all lanes, and a group behind the columns, lie inside the planes.
         unsafe {
             let (ys, zs) = (xs.add(frame.stride), xs.add(2 * frame.stride));
-            let (near, far) = (S::splat(least), S::splat(largest));
+            let (near, far) = (S::splat(held[0]), S::splat(held[1]));
             let mut hidden = S::splat(0.0);
             let mut largest = S::splat(0.0);
             for step in 0..frame.steps::<S>() {
                 let at = step * S::LANES;
-                let [x, y, z] = points.lanes::<S>(at);
+                let [x, y, z] = points_of_row.lanes::<S>(at);
                 let held_z = S::and(S::lt(near, S::abs(z)), S::lt(S::abs(z), far));
-                let held = S::and(held_z, S::and(S::finite(x), S::finite(y)));
-                hidden = S::or(hidden, S::and_not(held, held_z));
-                let x = S::select(held, x, S::splat(filler[0]));
-                let y = S::select(held, y, S::splat(filler[1]));
-                let z = S::select(held, z, S::splat(filler[2]));
+                let is_held = S::and(held_z, S::and(S::finite(x), S::finite(y)));
+                hidden = S::or(hidden, S::and_not(is_held, held_z));
+                let x = S::select(is_held, x, S::splat(filler[0]));
+                let y = S::select(is_held, y, S::splat(filler[1]));
+                let z = S::select(is_held, z, S::splat(filler[2]));
                 largest = S::max(largest, S::max(S::abs(x), S::abs(y)));
                 S::store(xs.add(at), x);
                 S::store(ys.add(at), y);
@@ -223,7 +218,10 @@ impl Planes {
             }
             let mut lanes = [0.0; LANES];
             S::store(lanes.as_mut_ptr(), largest);
-            RowNews { hidden: S::bits(hidden) != 0, largest: lanes.into_iter().fold(0.0, f32::max) }
+            if S::bits(hidden) != 0 {
+                self.hidden.note(points, frame, y, held);
+            }
+            lanes.into_iter().fold(0.0, f32::max)
         }
     }
 }

@@ -85,6 +85,11 @@ impl Lane for i32 {
 }
 
 impl<T: Lane, const N: usize> OfRun<T, N> {
+    /// Those of the pixel that is `at` in the run.
+    pub fn of_one(&self, at: usize) -> [T; N] {
+        self.0.map(|numbers| numbers[at])
+    }
+
     /// Those of the pixels from `at` on.
     ///
     /// # Safety

@@ -11,6 +11,7 @@ use super::planes::{Frame, MARGIN, Planes};
 use super::tile::{Bits, Found, Pair, Sums, Tile};
 use crate::Error;
 use crate::memory::{bytes, make_room};
+use crate::methods::{Estimate, average_3d_gradient};
 use crate::simd::{Along, GROUP, Groups, Simd};
 use crate::window::Image;
 
@@ -205,5 +206,18 @@ impl Sums for StripPairs {
     ) -> Found<S> {
         // SAFETY: as the caller's.
         unsafe { run.normals(&self.scale, at, sides) }
+    }
+
+    #[cold]
+    fn precisely(
+        &self,
+        tile: &Tile,
+        (pixel, side): ((usize, usize), usize),
+        _run: &Gradients,
+        _at: usize,
+        _fresh: bool,
+    ) -> Option<Estimate> {
+        let is_inside = tile.inner(side, pixel.1).contains(&pixel.0);
+        is_inside.then(|| average_3d_gradient::estimate_of_finite(tile.points, pixel, side))
     }
 }

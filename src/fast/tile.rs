@@ -40,6 +40,35 @@ impl<S: Simd> Found<S> {
             self.curvature.0 = S::select(mask, other.curvature.0, self.curvature.0);
         }
     }
+
+    /// Takes those that `precisely` gives for some lanes; returns the others.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`, and as many lanes are used.
+    #[inline(always)]
+    pub unsafe fn take_precise(
+        &mut self,
+        lanes: u32,
+        precisely: impl Fn(usize) -> Option<Estimate>,
+    ) -> u32 {
+        const { assert!(S::LANES == LANES) };
+        let (mut estimates, mut left) = (Estimates::NONE, 0);
+        for lane in Bits(lanes) {
+            match precisely(lane) {
+                Some(estimate) => estimates.put(lane, estimate),
+                None => left |= 1 << lane,
+            }
+        }
+        // SAFETY: as the caller's; the arrays hold so many lanes each.
+        unsafe {
+            let of_lanes = |lanes: &[f32; LANES]| Floats::load(lanes.as_ptr());
+            let [x, y, z] = &estimates.normal;
+            let normal = [of_lanes(x), of_lanes(y), of_lanes(z)];
+            let curvature = of_lanes(&estimates.curvature);
+            self.take(lanes & !left, &Found { normal, curvature, doubtful: 0 });
+        }
+        left
+    }
 }
 
 /// A method's sums over windows, from rings of integral rows. Each method says what it keeps a ring of.
@@ -106,6 +135,20 @@ pub(crate) trait Sums {
         _at: usize,
     ) -> bool {
         false
+    }
+
+    /// The estimate of the pixel that is `at` in a run, where floats leave it doubtful, or its sums do; none if it is left
+    /// to the plain form. `window` is its own and the side of its window, and whether its sums are from [`Sums::afresh`],
+    /// `fresh` tells.
+    fn precisely(
+        &self,
+        _tile: &Tile,
+        _window: ((usize, usize), usize),
+        _run: &Self::OfRun,
+        _at: usize,
+        _fresh: bool,
+    ) -> Option<Estimate> {
+        None
     }
 
     /// The estimates of the pixels from `at` on in a run, which are solved; `sides` are those of their windows. Whether
@@ -269,19 +312,15 @@ impl Tile<'_> {
         let mut run = Run::default();
         let (before, after) = (side / 2 + 1, side.div_ceil(2));
         let mut next = frame.rows.start;
-        // The rows behind the last one with a hidden point, and what windows reach.
-        let mut hidden_end = 0;
+        planes.hidden.start();
         for y in self.rows.clone() {
             while next < (y + after + 1).min(self.image.height) {
                 // SAFETY: as the caller's.
-                let news = unsafe {
+                let largest = unsafe {
                     planes.push::<S::Widest>(points, frame, next, whole_points, held, origin)
                 };
-                if news.largest > limit {
+                if largest > limit {
                     return Err(BeyondLimit);
-                }
-                if news.hidden {
-                    hidden_end = next + before + 1;
                 }
                 // SAFETY: as the caller's.
                 unsafe { sums.push::<S>(frame, planes, next) };
@@ -289,7 +328,7 @@ impl Tile<'_> {
             }
             sums.aim(frame, y, side);
             let inner = self.inner(side, y);
-            let hidden = y < hidden_end;
+            let hidden = planes.hidden.aim(frame, y, before);
             // SAFETY: as the caller's.
             unsafe {
                 self.row::<S, M>(frame, planes, sums, sink, &mut run, y, &inner, layer, hidden);
@@ -371,16 +410,19 @@ impl Tile<'_> {
                         written = pair.windows;
                     }
                     let windows = pair.windows;
+                    let mut plain = 0;
+                    if hidden {
+                        plain = planes.hidden.in_windows(frame, &pair);
+                        pair.windows &= !plain;
+                    }
                     if windows == 0 {
                         self.write::<S>(sink, (x, y), written, &Estimates::NONE);
                         continue;
                     }
                     let at = run.length * LANES;
-                    let plain = if hidden {
-                        windows
-                    } else {
-                        sums.note::<S>(self, frame, planes, &pair, &mut run.sums, at)
-                    };
+                    if pair.windows != 0 {
+                        plain |= sums.note::<S>(self, frame, planes, &pair, &mut run.sums, at);
+                    }
                     run.places[run.length] = (x, windows, written);
                     run.lanes[run.length] = windows & !plain;
                     run.length += 1;
@@ -422,17 +464,24 @@ impl Tile<'_> {
                     of_one_point = self.of_one_point(frame, planes, row, (x, y), doubtful);
                     (windows, doubtful) = (windows & !of_one_point, doubtful & !of_one_point);
                 }
-                let mut plain = windows & !lanes[number] | doubtful;
                 if doubtful != 0 {
                     let window = |lane: usize| ((x + lane, y), row[x + lane] as usize);
+                    let precisely = |lane: usize, run: &M::OfRun, fresh: bool| {
+                        sums.precisely(self, window(lane), run, at + lane, fresh)
+                    };
+                    doubtful = found.take_precise(doubtful, |lane| precisely(lane, of_run, false));
                     let (points, image) = (self.points, self.image);
-                    if M::afresh::<S>(points, image, window, doubtful, of_run, at) {
+                    if doubtful != 0 && M::afresh::<S>(points, image, window, doubtful, of_run, at)
+                    {
                         of_run.solve::<S>(at, &[doubtful]);
                         let fresh = sums.estimate::<S::Pair>(of_run, at, sides, true);
                         found.take(doubtful, &fresh);
-                        plain &= !doubtful | fresh.doubtful;
+                        doubtful &= fresh.doubtful;
+                        doubtful =
+                            found.take_precise(doubtful, |lane| precisely(lane, of_run, true));
                     }
                 }
+                let plain = windows & !lanes[number] | doubtful;
                 let column = frame.column(x);
                 let point = [
                     Floats::load(planes_row[0].as_ptr().add(column)),
@@ -673,7 +722,7 @@ pub(crate) struct Bits(pub u32);
 
 impl Bits {
     /// The mask of those of which this is so.
-    fn which(self, is_so: impl Fn(usize) -> bool) -> u32 {
+    pub fn which(self, is_so: impl Fn(usize) -> bool) -> u32 {
         self.filter(|lane| is_so(*lane)).fold(0, |lanes, lane| lanes | 1 << lane)
     }
 }

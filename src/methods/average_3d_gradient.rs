@@ -32,6 +32,23 @@ pub(crate) fn estimate(
     normal_of_tangents(vertical.sum, horizontal.sum)
 }
 
+/// The same of a window that, with the pixels around it, lies inside the image and holds finite points only: over a row or
+/// column the differences telescope to those between its ends.
+pub(crate) fn estimate_of_finite(points: &Points, (x, y): (usize, usize), side: usize) -> Estimate {
+    let (left, top) = (x - side / 2, y - side / 2);
+    let (right, bottom) = (left + side, top + side);
+    let (mut horizontal, mut vertical) = (Gradient::default(), Gradient::default());
+    for ahead in [0, 1] {
+        for y in top..bottom {
+            horizontal.add(points.at(right - ahead, y), points.at(left - ahead, y));
+        }
+        for x in left..right {
+            vertical.add(points.at(x, bottom - ahead), points.at(x, top - ahead));
+        }
+    }
+    normal_of_tangents(vertical.sum, horizontal.sum)
+}
+
 /// A sum of differences and how many there are.
 #[derive(Default)]
 struct Gradient {

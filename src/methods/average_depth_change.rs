@@ -1,7 +1,7 @@
 //! AVERAGE_DEPTH_CHANGE: the paper's SDC (Eq. 9-15) as PCL computes it: mean depths of four half windows for the
 //! tangents' z, single points for their x and y.
 
-use super::{Estimate, normal_of_tangents, start};
+use super::{Estimate, is_length, normal_of_tangents, start};
 use crate::cloud::Points;
 use crate::window::Image;
 
@@ -70,7 +70,7 @@ pub(crate) fn estimate(
 fn single_precision_normal(a: [f32; 3], b: [f32; 3]) -> Estimate {
     let n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let squared_length = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
-    if squared_length == 0.0 {
+    if !is_length(squared_length.into()) {
         return Estimate::NONE;
     }
     let scale = 1.0 / squared_length.sqrt();

@@ -71,17 +71,22 @@ pub(crate) fn finite_point(points: &Points, (x, y): (usize, usize)) -> Option<[f
     is_finite(point).then(|| point.map(f64::from))
 }
 
+/// Whether a vector of such a length, or square of one, has a direction.
+pub(crate) fn is_length(length: f64) -> bool {
+    0.0 < length && length < f64::INFINITY
+}
+
 #[inline(always)]
 pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-/// The unit vector along the cross product of two tangents; none if they are parallel.
+/// The unit vector along the cross product of two tangents; none if they are parallel or not finite.
 #[inline(always)]
 pub(crate) fn normal_of_tangents(first: [f64; 3], second: [f64; 3]) -> Estimate {
     let n = cross(first, second);
     let squared_length = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
-    if squared_length == 0.0 {
+    if !is_length(squared_length) {
         return Estimate::NONE;
     }
     let length = squared_length.sqrt();

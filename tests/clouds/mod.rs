@@ -56,10 +56,12 @@ pub enum Kind {
     NegativeZ,
     Shifted,
     Millimetres,
+    /// z in other units than x and y: all windows are nearly lines.
+    MixedUnits,
 }
 
 impl Kind {
-    pub const ALL: [Kind; 15] = [
+    pub const ALL: [Kind; 16] = [
         Kind::Wavy,
         Kind::Noisy,
         Kind::Plane,
@@ -75,6 +77,7 @@ impl Kind {
         Kind::NegativeZ,
         Kind::Shifted,
         Kind::Millimetres,
+        Kind::MixedUnits,
     ];
 }
 
@@ -234,6 +237,7 @@ impl Cloud {
             Kind::NegativeZ => self.points.iter_mut().for_each(|p| p[2] = -p[2]),
             Kind::Shifted => self.points.iter_mut().flatten().for_each(|c| *c += 100.0),
             Kind::Millimetres => self.points.iter_mut().flatten().for_each(|c| *c *= 1000.0),
+            Kind::MixedUnits => self.points.iter_mut().for_each(|point| point[2] *= 1000.0),
             _ => {}
         }
     }

@@ -7,6 +7,7 @@ use crate::fast::arithmetic::{Doubles, Floats, cross, dot};
 use crate::fast::moments::{Matrices, WindowMoments, sum_of_moments};
 use crate::fast::run::{Noted, OfRun};
 use crate::fast::tile::{Bits, Found};
+use crate::methods::Estimate;
 use crate::paper::{CleanPoints, ROUNDING, Rect};
 use crate::simd::{GROUP, Groups, Simd};
 
@@ -55,6 +56,12 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
         _at: usize,
     ) -> bool {
         false
+    }
+
+    /// The estimate of the pixel that is `at` in a run, where floats leave it doubtful; none if the rounding errors of its
+    /// sums, which stay below `error`, do too.
+    fn precisely(_run: &Self::OfRun, _at: usize, _error: f64) -> Option<Estimate> {
+        None
     }
 
     /// The normals of the pixels from `at` on in a run, which are solved.
@@ -162,6 +169,10 @@ impl Sums<MOMENTS> for CovarianceMatrix {
     unsafe fn estimate<S: Simd>(run: &Matrices, at: usize, error: f64) -> Found<S> {
         // SAFETY: as the caller's.
         unsafe { run.normals(at, error) }
+    }
+
+    fn precisely(run: &Matrices, at: usize, error: f64) -> Option<Estimate> {
+        run.precisely(at, error)
     }
 }
 
