@@ -24,7 +24,7 @@ impl Workers {
         };
         let process = std::process::id();
         if self.process != process {
-            // To drop it is to wait for its threads.
+            // Not dropped: what that locks one of its threads may have held.
             std::mem::forget(self.pool.take());
             self.process = process;
         }

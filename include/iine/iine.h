@@ -420,7 +420,8 @@ int32_t iine_estimator_compute_maps(struct iine_estimator *estimator,
 int32_t iine_estimator_scratch_size(const struct iine_estimator *estimator, size_t *bytes);
 
 /**
- * Frees the estimator's scratch memory and has its worker threads end, which they do soon after; the next computation makes them anew.
+ * Frees the estimator's scratch memory and has its worker threads end, which they do soon after; the next computation
+ * makes them anew.
  *
  * Errors: IINE_ERROR_NULL_POINTER.
  *

@@ -284,7 +284,8 @@ pub unsafe extern "C" fn iine_estimator_scratch_size(
     })
 }
 
-/// Frees the estimator's scratch memory and has its worker threads end, which they do soon after; the next computation makes them anew.
+/// Frees the estimator's scratch memory and has its worker threads end, which they do soon after; the next computation
+/// makes them anew.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER.
 ///
