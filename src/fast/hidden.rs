@@ -10,11 +10,11 @@ use crate::cloud::Points;
 /// Those of a tile's rows.
 #[derive(Debug, Default)]
 pub(crate) struct Hidden {
-    /// By column of the frame: the row behind the last one that has such a point.
+    /// By column of the frame: the row behind the last one that has such a point; 0 for none.
     behind: Buffer<u32>,
     /// Before each column, and behind the last: how many have one in the rows that windows of the row aimed at reach.
     counts: Buffer<u32>,
-    /// The row behind the last one that has some.
+    /// The row behind the last one that has some; 0 for none.
     end: usize,
 }
 
@@ -53,7 +53,7 @@ impl Hidden {
     /// Aims at the windows around the pixels of row `y`, which reach so many rows up; whether some may hold one.
     #[inline(always)]
     pub fn aim(&mut self, frame: &Frame, y: usize, before: usize) -> bool {
-        let may_hold_one = y < self.end + before;
+        let may_hold_one = reaches(self.end, y, before);
         if may_hold_one {
             self.count(frame, y, before);
         }
@@ -66,7 +66,7 @@ impl Hidden {
         let mut count = 0;
         self.counts[0] = 0;
         for (behind, to) in behind.iter().zip(&mut self.counts[1..]) {
-            count += u32::from(*behind as usize + before > y);
+            count += u32::from(reaches(*behind as usize, y, before));
             *to = count;
         }
     }
@@ -82,4 +82,10 @@ impl Hidden {
             self.counts[column(x.saturating_sub(before))] < self.counts[column(x + after + 1)]
         })
     }
+}
+
+/// Whether so many rows before row `y` reach the one before `behind`, if there is one.
+#[inline(always)]
+fn reaches(behind: usize, y: usize, before: usize) -> bool {
+    behind > 0 && y < behind + before
 }
