@@ -90,11 +90,9 @@ const CONVERGED: f32 = 1e-3;
 /// A normal is doubtful if the error of the sums could turn it by more than 3e-5.
 const DOUBT_SUMS: f64 = 3e4;
 
-/// In doubles, if it could turn it by more than 1e-5.
-const DOUBT_PRECISE: f64 = 1e5;
-
-/// How much larger than the trace a window's own sums about one of its points are at most, but for a few.
-const OWN_SUMS: f64 = 4.0;
+/// In doubles, the least distance between the two smaller eigenvalues (of a matrix of trace 1), so that rounding turns a
+/// normal by less than 1e-5. A window's sums about one of its points are up to four times as large as the trace.
+const LEAST_GAP: f64 = 1e5 * 4.0 * ROUNDING;
 
 /// The least product of the smallest eigenvalue's distances from the others (of a matrix of trace 1): the rounding of
 /// the determinant, some 1e-16, over its square turns the normal.
@@ -423,9 +421,8 @@ impl Sums for Moments {
         _window: ((usize, usize), usize),
         run: &Matrices,
         at: usize,
-        fresh: bool,
     ) -> Option<Estimate> {
-        run.precisely(at, if fresh { 0.0 } else { self.error })
+        run.precisely(at)
     }
 }
 
@@ -526,17 +523,16 @@ impl Matrices {
         }
     }
 
-    /// The estimate of the pixel that is `at` in the run, in doubles; none if the moments' rounding errors, which stay below
-    /// `error`, leave it doubtful.
+    /// The estimate of the pixel that is `at` in the run, in doubles, from moments about one of its window's points; none if
+    /// rounding leaves it doubtful.
     #[cold]
-    pub fn precisely(&self, at: usize, error: f64) -> Option<Estimate> {
+    pub fn precisely(&self, at: usize) -> Option<Estimate> {
         let [xx, xy, xz, yy, yz, zz] = self.elements.of_one(at);
         let (values, vector) = eigen(&Symmetric3 { xx, xy, xz, yy, yz, zz });
-        // The matrix is over this, which may be rounding alone.
-        let trace = f64::from(self.trace.of_one(at)[0]);
-        let error = error + OWN_SUMS * ROUNDING * trace;
+        // The matrix is over its trace, which may be rounding alone.
+        let [trace] = self.trace.of_one(at);
         let curvature = (values[0] / (xx + yy + zz)) as f32;
-        (DOUBT_PRECISE * error < (values[1] - values[0]) * trace)
+        (trace > 0.0 && LEAST_GAP < values[1] - values[0])
             .then(|| Estimate { normal: vector.map(|c| c as f32), curvature })
     }
 

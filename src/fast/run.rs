@@ -87,7 +87,7 @@ impl Lane for i32 {
 impl<T: Lane, const N: usize> OfRun<T, N> {
     /// Those of the pixel that is `at` in the run.
     pub fn of_one(&self, at: usize) -> [T; N] {
-        self.0.map(|numbers| numbers[at])
+        std::array::from_fn(|c| self.0[c][at])
     }
 
     /// Those of the pixels from `at` on.

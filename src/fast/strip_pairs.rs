@@ -215,7 +215,6 @@ impl Sums for StripPairs {
         (pixel, side): ((usize, usize), usize),
         _run: &Gradients,
         _at: usize,
-        _fresh: bool,
     ) -> Option<Estimate> {
         let is_inside = tile.inner(side, pixel.1).contains(&pixel.0);
         is_inside.then(|| average_3d_gradient::estimate_of_finite(tile.points, pixel, side))

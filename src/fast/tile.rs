@@ -52,13 +52,7 @@ impl<S: Simd> Found<S> {
         precisely: impl Fn(usize) -> Option<Estimate>,
     ) -> u32 {
         const { assert!(S::LANES == LANES) };
-        let (mut estimates, mut left) = (Estimates::NONE, 0);
-        for lane in Bits(lanes) {
-            match precisely(lane) {
-                Some(estimate) => estimates.put(lane, estimate),
-                None => left |= 1 << lane,
-            }
-        }
+        let (estimates, left) = all_precise(lanes, precisely);
         // SAFETY: as the caller's; the arrays hold so many lanes each.
         unsafe {
             let of_lanes = |lanes: &[f32; LANES]| Floats::load(lanes.as_ptr());
@@ -69,6 +63,20 @@ impl<S: Simd> Found<S> {
         }
         left
     }
+}
+
+/// What `precisely` gives for some lanes, and those for which that is nothing.
+#[cold]
+#[inline(never)]
+fn all_precise(lanes: u32, precisely: impl Fn(usize) -> Option<Estimate>) -> (Estimates, u32) {
+    let (mut estimates, mut left) = (Estimates::NONE, 0);
+    for lane in Bits(lanes) {
+        match precisely(lane) {
+            Some(estimate) => estimates.put(lane, estimate),
+            None => left |= 1 << lane,
+        }
+    }
+    (estimates, left)
 }
 
 /// A method's sums over windows, from rings of integral rows. Each method says what it keeps a ring of.
@@ -137,16 +145,14 @@ pub(crate) trait Sums {
         false
     }
 
-    /// The estimate of the pixel that is `at` in a run, where floats leave it doubtful, or its sums do; none if it is left
-    /// to the plain form. `window` is its own and the side of its window, and whether its sums are from [`Sums::afresh`],
-    /// `fresh` tells.
+    /// The estimate of the pixel that is `at` in a run, where it is doubtful, even after [`Sums::afresh`] if the method has
+    /// that; none if it is left to the plain form. `window` is its own and the side of its window.
     fn precisely(
         &self,
         _tile: &Tile,
         _window: ((usize, usize), usize),
         _run: &Self::OfRun,
         _at: usize,
-        _fresh: bool,
     ) -> Option<Estimate> {
         None
     }
@@ -466,19 +472,17 @@ impl Tile<'_> {
                 }
                 if doubtful != 0 {
                     let window = |lane: usize| ((x + lane, y), row[x + lane] as usize);
-                    let precisely = |lane: usize, run: &M::OfRun, fresh: bool| {
-                        sums.precisely(self, window(lane), run, at + lane, fresh)
-                    };
-                    doubtful = found.take_precise(doubtful, |lane| precisely(lane, of_run, false));
                     let (points, image) = (self.points, self.image);
-                    if doubtful != 0 && M::afresh::<S>(points, image, window, doubtful, of_run, at)
-                    {
+                    if M::afresh::<S>(points, image, window, doubtful, of_run, at) {
                         of_run.solve::<S>(at, &[doubtful]);
                         let fresh = sums.estimate::<S::Pair>(of_run, at, sides, true);
                         found.take(doubtful, &fresh);
                         doubtful &= fresh.doubtful;
-                        doubtful =
-                            found.take_precise(doubtful, |lane| precisely(lane, of_run, true));
+                    }
+                    if doubtful != 0 {
+                        doubtful = found.take_precise(doubtful, |lane| {
+                            sums.precisely(self, window(lane), of_run, at + lane)
+                        });
                     }
                 }
                 let plain = windows & !lanes[number] | doubtful;

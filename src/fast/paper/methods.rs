@@ -58,9 +58,9 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
         false
     }
 
-    /// The estimate of the pixel that is `at` in a run, where floats leave it doubtful; none if the rounding errors of its
-    /// sums, which stay below `error`, do too.
-    fn precisely(_run: &Self::OfRun, _at: usize, _error: f64) -> Option<Estimate> {
+    /// The estimate of the pixel that is `at` in a run, where it is doubtful even after [`Sums::afresh`]; none if it is left
+    /// to the plain form.
+    fn precisely(_run: &Self::OfRun, _at: usize) -> Option<Estimate> {
         None
     }
 
@@ -171,8 +171,8 @@ impl Sums<MOMENTS> for CovarianceMatrix {
         unsafe { run.normals(at, error) }
     }
 
-    fn precisely(run: &Matrices, at: usize, error: f64) -> Option<Estimate> {
-        run.precisely(at, error)
+    fn precisely(run: &Matrices, at: usize) -> Option<Estimate> {
+        run.precisely(at)
     }
 }
 

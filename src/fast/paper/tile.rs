@@ -278,15 +278,14 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
                     let of_one_point = self.of_one_point::<S::Widest>(pixel, rect, plain);
                     (windows, plain) = (windows & !of_one_point, plain & !of_one_point);
                 }
-                if plain != 0 {
-                    plain = found.take_precise(plain, |lane| M::precisely(sums, at + lane, error));
-                }
                 if plain != 0 && M::afresh::<S>(&cleaned, rect, plain, sums, at) {
                     sums.solve::<S>(at, &[plain]);
                     let fresh = M::estimate::<S::Pair>(sums, at, 0.0);
                     found.take(plain, &fresh);
                     plain &= fresh.doubtful;
-                    plain = found.take_precise(plain, |lane| M::precisely(sums, at + lane, 0.0));
+                    if plain != 0 {
+                        plain = found.take_precise(plain, |lane| M::precisely(sums, at + lane));
+                    }
                 }
                 let viewpoint = self.options.viewpoint;
                 let (sure, here) = (windows & !plain, points.load::<S::Pair>(at));
