@@ -22,12 +22,8 @@ impl Workers {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
             threads => threads,
         };
-        let process = std::process::id();
-        if self.process != process {
-            // Not dropped: what that locks one of its threads may have held.
-            std::mem::forget(self.pool.take());
-            self.process = process;
-        }
+        self.forget_parents();
+        self.process = std::process::id();
         if threads == 1 {
             self.pool = None;
         } else if self.count() != threads {
@@ -35,6 +31,13 @@ impl Workers {
             self.pool = Some(pool.map_err(|_| Error::Threads)?);
         }
         Ok(())
+    }
+
+    /// In a fork, what dropping its parent's threads locks one of them may have held.
+    fn forget_parents(&mut self) {
+        if self.process != std::process::id() {
+            std::mem::forget(self.pool.take());
+        }
     }
 
     pub fn count(&self) -> usize {
@@ -94,5 +97,11 @@ impl Workers {
             }
             run(0);
         });
+    }
+}
+
+impl Drop for Workers {
+    fn drop(&mut self) {
+        self.forget_parents();
     }
 }

@@ -300,12 +300,15 @@ fn a_forked_process_starts_threads_of_its_own() {
     let mut estimator = Estimator::new(Options::default());
     estimator.options_mut().threads = 2;
     let expected = compute(&mut estimator, &cloud);
+    let mut unused = Estimator::new(estimator.options().clone());
+    compute(&mut unused, &cloud);
     // SAFETY: the child computes, and ends before anything of the test's goes on in it.
     let child = unsafe { libc::fork() };
     if child == 0 {
         // SAFETY: these end the child: what waits for threads that are not there would do so for ever.
         unsafe { libc::alarm(60) };
         let found = compute(&mut estimator, &cloud);
+        drop(unused);
         let bits =
             |normals: &[[f32; 4]]| normals.as_flattened().iter().map(|c| c.to_bits()).collect();
         let [found, expected]: [Vec<u32>; 2] = [bits(&found), bits(&expected)];

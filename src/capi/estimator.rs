@@ -236,7 +236,7 @@ fn check_maps_disjoint(maps: &iine_maps, pixels: usize, points: &Points) -> Resu
         (maps.depth_radii.addr(), float_bytes),
         (maps.eigenvalues.addr(), 3 * float_bytes),
     ];
-    let mut seen = [(0, 0); 5];
+    let mut seen = maps.map(|_| (0, 0));
     for (i, (start, bytes)) in maps.into_iter().enumerate() {
         if start == 0 {
             continue;

@@ -2,7 +2,7 @@
 //! go wrong there.
 
 use super::buffer::Buffer;
-use super::planes::Frame;
+use super::planes::{Frame, window_reach};
 use super::tile::{Bits, Pair};
 use crate::Error;
 use crate::cloud::Points;
@@ -78,7 +78,7 @@ impl Hidden {
             |x: usize| x.clamp(frame.columns.start, frame.columns.end) - frame.columns.start;
         Bits(pair.windows).which(|lane| {
             let ((x, _), side) = pair.window(lane);
-            let (before, after) = (side / 2 + 1, side.div_ceil(2));
+            let (before, after) = window_reach(side);
             self.counts[column(x.saturating_sub(before))] < self.counts[column(x + after + 1)]
         })
     }

@@ -50,7 +50,7 @@ impl Frame {
         side: usize,
         (width, height): (usize, usize),
     ) -> Self {
-        let (before, after) = (side / 2 + 1, side.div_ceil(2));
+        let (before, after) = window_reach(side);
         let left = columns.start.saturating_sub(before) / GROUP * GROUP;
         let right = (columns.end + after + 1).min(width);
         let top = rows.start.saturating_sub(before);
@@ -118,6 +118,13 @@ impl Frame {
     pub fn column(&self, x: usize) -> usize {
         x.wrapping_add(MARGIN).wrapping_sub(self.columns.start)
     }
+}
+
+/// How far windows of a side, and the pixels around them, reach from their pixels: to the left and upwards, and to the
+/// right and downwards.
+#[inline(always)]
+pub(crate) fn window_reach(side: usize) -> (usize, usize) {
+    (side / 2 + 1, side.div_ceil(2))
 }
 
 /// Left and right above, left and right below. Before a pixel's column is added, they may be wrapped around zero.

@@ -6,7 +6,7 @@ use std::ops::{Range, RangeInclusive};
 use super::arithmetic::{Floats, dot};
 use super::lanes::LANES;
 use super::layers::Layer;
-use super::planes::{Frame, MARGIN, Planes};
+use super::planes::{Frame, MARGIN, Planes, window_reach};
 use super::run::{Noted, RUN};
 use super::sink::Sink;
 use super::windows::Sides;
@@ -316,7 +316,7 @@ impl Tile<'_> {
     ) -> Result<(), BeyondLimit> {
         let (points, whole_points, held) = (self.points, self.whole_points, layer.held);
         let mut run = Run::default();
-        let (before, after) = (side / 2 + 1, side.div_ceil(2));
+        let (before, after) = window_reach(side);
         let mut next = frame.rows.start;
         planes.hidden.start();
         for y in self.rows.clone() {
@@ -519,12 +519,12 @@ impl Tile<'_> {
     ) -> u32 {
         let Image { width, height, .. } = *self.image;
         let are_alike = |lanes: RangeInclusive<usize>, side: usize| {
-            let (before, after) = (side / 2 + 1, side.div_ceil(2) + 1);
+            let (before, after) = window_reach(side);
             let (first, last) = (x + lanes.start(), x + lanes.end());
-            let columns = first.saturating_sub(before)..(last + after).min(width);
+            let columns = first.saturating_sub(before)..(last + after + 1).min(width);
             let columns = frame.column(columns.start)..frame.column(columns.end);
             let own = planes.rows(frame, y).map(|plane| plane[frame.column(first)].to_bits());
-            (y.saturating_sub(before)..(y + after).min(height)).all(|y| {
+            (y.saturating_sub(before)..(y + after + 1).min(height)).all(|y| {
                 let planes = planes.rows(frame, y).map(|plane| &plane[columns.clone()]);
                 let differ = |c: usize| planes[c].iter().map(move |at| at.to_bits() ^ own[c]);
                 (0..3).flat_map(differ).fold(0, |any, bits| any | bits) == 0
