@@ -7,6 +7,9 @@ if(RUST_TARGET)
   string(TOUPPER "${RUST_TARGET}" name)
   string(REPLACE "-" "_" name "${name}")
   set(ENV{CARGO_TARGET_${name}_LINKER} ${LINKER})
+else()
+  # It would change where cargo puts the library.
+  unset(ENV{CARGO_BUILD_TARGET})
 endif()
 
 execute_process(COMMAND ${CARGO} ${arguments} RESULT_VARIABLE result)

@@ -6,14 +6,14 @@
 #   iine::pcl         the C++ class for PCL (header-only) on iine::iine, and PCL itself once it has been found
 #   iine::pcl_dropin  iine::pcl, and #include <pcl/features/integral_image_normal.h> is ours
 #
-# In: iine_LIBRARY_DIR, iine_INCLUDE_DIR, iine_ABI (as in the SONAME), iine_SCOPE (GLOBAL or empty).
+# In: iine_LIBRARY_DIR, iine_INCLUDE_DIR, iine_VERSION, iine_ABI (as in the SONAME), iine_SCOPE (GLOBAL or empty).
 
 # What rustc says a static library of this crate needs (--print native-static-libs; a test compares).
 set(iine_STATIC_LIBRARIES gcc_s util rt pthread m dl c)
 
 add_library(iine::shared SHARED IMPORTED ${iine_SCOPE})
 set_target_properties(iine::shared PROPERTIES
-  IMPORTED_LOCATION ${iine_LIBRARY_DIR}/libiine.so
+  IMPORTED_LOCATION ${iine_LIBRARY_DIR}/libiine.so.${iine_VERSION}
   IMPORTED_SONAME libiine.so.${iine_ABI}
   INTERFACE_INCLUDE_DIRECTORIES ${iine_INCLUDE_DIR})
 

@@ -63,7 +63,7 @@ impl Grid {
         y * self.row_stride + x * self.point_stride
     }
 
-    /// A number of bytes that every two pixels' fields are a multiple of apart.
+    /// The fields of any two pixels are a multiple of so many bytes apart.
     fn step(&self) -> usize {
         match self.height {
             1 => self.point_stride,

@@ -33,7 +33,7 @@ pub(crate) fn make_room<T>(table: &mut Vec<T>, count: usize) -> Result<(), Error
     Ok(table.try_reserve(count)?)
 }
 
-/// Makes a table as long as this; those that it has more than before are such values.
+/// Makes a table as long as this; what is new in it is this value.
 pub(crate) fn resize<T: Clone>(table: &mut Vec<T>, length: usize, value: T) -> Result<(), Error> {
     table.try_reserve(length.saturating_sub(table.len()))?;
     table.resize(length, value);

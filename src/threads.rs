@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
+use std::thread::JoinHandle;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -11,7 +12,9 @@ use crate::Error;
 #[derive(Debug, Default)]
 pub(crate) struct Workers {
     pool: Option<ThreadPool>,
-    /// The process that has the pool's threads: a fork of it has none of them.
+    /// The pool's threads.
+    threads: Vec<JoinHandle<()>>,
+    /// The process that has them: a fork of it has none.
     process: u32,
 }
 
@@ -22,21 +25,39 @@ impl Workers {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
             threads => threads,
         };
-        self.forget_parents();
-        self.process = std::process::id();
-        if threads == 1 {
-            self.pool = None;
-        } else if self.count() != threads {
-            let pool = ThreadPoolBuilder::new().num_threads(threads - 1).build();
-            self.pool = Some(pool.map_err(|_| Error::Threads)?);
+        if self.process != std::process::id() || self.count() != threads {
+            self.end();
+        }
+        if threads > 1 && self.pool.is_none() {
+            self.process = std::process::id();
+            let handles = &mut self.threads;
+            let pool = ThreadPoolBuilder::new().num_threads(threads - 1).spawn_handler(|thread| {
+                handles.push(std::thread::Builder::new().spawn(|| thread.run())?);
+                Ok(())
+            });
+            match pool.build() {
+                Ok(pool) => self.pool = Some(pool),
+                Err(_) => {
+                    self.end();
+                    return Err(Error::Threads);
+                }
+            }
         }
         Ok(())
     }
 
-    /// In a fork, what dropping its parent's threads locks one of them may have held.
-    fn forget_parents(&mut self) {
+    /// Ends the threads, and waits for that: their code may be unloaded next.
+    fn end(&mut self) {
         if self.process != std::process::id() {
+            // In a fork the pool is not dropped: that takes locks which one of the parent's threads may have held.
             std::mem::forget(self.pool.take());
+            std::mem::forget(std::mem::take(&mut self.threads));
+            return;
+        }
+        self.pool = None;
+        for thread in self.threads.drain(..) {
+            // One that panicked has ended too.
+            let _ = thread.join();
         }
     }
 
@@ -102,6 +123,6 @@ impl Workers {
 
 impl Drop for Workers {
     fn drop(&mut self) {
-        self.forget_parents();
+        self.end();
     }
 }

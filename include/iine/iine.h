@@ -132,7 +132,7 @@
 #define IINE_DISTANCE_METRIC_EUCLIDEAN 0
 
 /**
- * Borgefors' 3-4 chamfer distance, divided by 3: at most 8 % off.
+ * Borgefors' 3-4 chamfer distance, divided by 3: at most 6 % off.
  */
 #define IINE_DISTANCE_METRIC_CHAMFER 1
 
@@ -373,8 +373,9 @@ int32_t iine_estimator_compute_indices(struct iine_estimator *estimator,
  *
  * The window starts at (x - rect_width / 2, y - rect_height / 2). What lies outside the image is left out with
  * IINE_BORDER_POLICY_IGNORE and folded back with IINE_BORDER_POLICY_MIRROR. Where the window gives no normal, and
- * a size of 0 never does, NaN is written. The border policy has no effect with IINE_SEMANTICS_PAPER. Takes time
- * proportional to the window's area, but to the cloud's with missing zeros in PCL's semantics.
+ * a size of 0 never does, NaN is written; where the pixel's point is missing, a normal that is not turned to the
+ * viewpoint. The border policy has no effect with IINE_SEMANTICS_PAPER. Takes time proportional to the window's
+ * area, but to the cloud's with missing zeros in PCL's semantics.
  *
  * Errors: as `iine_estimator_compute`, IINE_ERROR_INDEX if the pixel is outside the cloud, and
  * IINE_ERROR_OPTION_VALUE if a size is negative. Nothing is written then.
@@ -420,7 +421,7 @@ int32_t iine_estimator_compute_maps(struct iine_estimator *estimator,
 int32_t iine_estimator_scratch_size(const struct iine_estimator *estimator, size_t *bytes);
 
 /**
- * Frees the estimator's scratch memory and has its worker threads end, which they do soon after; the next computation
+ * Frees the estimator's scratch memory and ends its worker threads; the next computation
  * makes them anew.
  *
  * Errors: IINE_ERROR_NULL_POINTER.

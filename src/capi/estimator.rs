@@ -153,8 +153,9 @@ pub unsafe extern "C" fn iine_estimator_compute_indices(
 ///
 /// The window starts at (x - rect_width / 2, y - rect_height / 2). What lies outside the image is left out with
 /// IINE_BORDER_POLICY_IGNORE and folded back with IINE_BORDER_POLICY_MIRROR. Where the window gives no normal, and
-/// a size of 0 never does, NaN is written. The border policy has no effect with IINE_SEMANTICS_PAPER. Takes time
-/// proportional to the window's area, but to the cloud's with missing zeros in PCL's semantics.
+/// a size of 0 never does, NaN is written; where the pixel's point is missing, a normal that is not turned to the
+/// viewpoint. The border policy has no effect with IINE_SEMANTICS_PAPER. Takes time proportional to the window's
+/// area, but to the cloud's with missing zeros in PCL's semantics.
 ///
 /// Errors: as `iine_estimator_compute`, IINE_ERROR_INDEX if the pixel is outside the cloud, and
 /// IINE_ERROR_OPTION_VALUE if a size is negative. Nothing is written then.
@@ -284,7 +285,7 @@ pub unsafe extern "C" fn iine_estimator_scratch_size(
     })
 }
 
-/// Frees the estimator's scratch memory and has its worker threads end, which they do soon after; the next computation
+/// Frees the estimator's scratch memory and ends its worker threads; the next computation
 /// makes them anew.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER.

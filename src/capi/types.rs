@@ -44,7 +44,7 @@ pub const IINE_SEMANTICS_PAPER: i32 = 1;
 
 /// Exact Euclidean distance (the default).
 pub const IINE_DISTANCE_METRIC_EUCLIDEAN: i32 = 0;
-/// Borgefors' 3-4 chamfer distance, divided by 3: at most 8 % off.
+/// Borgefors' 3-4 chamfer distance, divided by 3: at most 6 % off.
 pub const IINE_DISTANCE_METRIC_CHAMFER: i32 = 1;
 
 /// Depth is z, for cameras (the default).

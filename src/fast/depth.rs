@@ -143,7 +143,7 @@ impl Depth for i32 {
 /// How large a part of the spacing of points a step of integers may be: then few windows are doubtful.
 const FINE: f32 = 1.6e-4;
 
-/// The spacing is looked at in one less rows and columns.
+/// The spacing is looked at in `SAMPLES - 1` rows and as many columns.
 const SAMPLES: usize = 8;
 
 /// What depths, of which none is larger than `deepest`, are multiplied by to become integers; none if these would not

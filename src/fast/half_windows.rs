@@ -22,7 +22,7 @@ pub(crate) struct HalfWindows<T> {
     pushed: usize,
     /// What depths are multiplied by.
     scale: f32,
-    /// Of [`DOUBT_ROUNDING`].
+    /// [`DOUBT_ROUNDING`] times the square of what the sums' rounding errors stay below.
     doubt: f32,
     /// By half of the side of a window.
     places: Vec<Places>,

@@ -89,7 +89,7 @@ struct WorkerScratch {
 /// What a tile needs.
 #[derive(Debug, Default)]
 struct TileScratch {
-    /// Here it leaves the tile's loops the registers.
+    /// Not a local variable of the tile's loops: it would take registers from them.
     frame: Frame,
     planes: Planes,
     moments: Moments,

@@ -144,8 +144,8 @@ pub(crate) unsafe fn sum_between<S: Simd, T: Lane>(ring: *const T, corners: &Cor
     }
 }
 
-/// The ring of x, y and z rows. In place of points that miss a coordinate, and of those behind a row's last, there is
-/// another one: no window holds it, but sums along rows and columns do.
+/// The ring of x, y and z rows. In place of points that miss a coordinate, and of those behind a row's last, stands the
+/// filler of [`Planes::push`]: sums along rows and columns hold it, but no window does.
 #[derive(Debug, Default)]
 pub(crate) struct Planes {
     data: Buffer<f32>,

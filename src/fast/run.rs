@@ -122,8 +122,8 @@ impl<T: Lane, const N: usize> OfRun<T, N> {
 
 /// What a method notes of a run's windows.
 pub(crate) trait Noted: Default {
-    /// Goes as far with normals as has no other use of their windows: those of the pairs of groups from `at` on, with
-    /// `lanes` of each that have been noted; the others hold anything.
+    /// Takes the steps towards the normals that need these notes only, for the pairs of groups from `at` on. Of each pair
+    /// `lanes` have been noted; the others hold anything.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.

@@ -44,7 +44,7 @@ impl<S: Simd> Found<S> {
     /// Takes those that `precisely` gives for some lanes; returns the others.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`, and as many lanes are used.
+    /// The processor has the instruction set of `S`.
     #[inline(always)]
     pub unsafe fn take_precise(
         &mut self,

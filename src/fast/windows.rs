@@ -707,7 +707,7 @@ unsafe fn carry<S: Simd>(
                 if S::bits(S::lt(value, S::min(own, exact))) == 0 {
                     return;
                 }
-                // Where it is no nearer, it is not farther along either: neighbours are at most a step apart.
+                // Where it is no nearer here, it is not further along either: neighbours' distances differ by a step at most.
                 row[at].store::<S>(S::min(value, own));
             }
             // Some segment's own end is nearer now.

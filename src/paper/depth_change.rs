@@ -20,7 +20,7 @@ use crate::Error;
 use crate::memory::{bytes, refill, table};
 use crate::threads::Workers;
 
-/// More than any window's radius. (Signed: every processor has the least of eight.)
+/// More than any window's radius. (Signed: of such numbers every processor takes the lesser eight at a time.)
 const LARGEST_CLEAN: i16 = i16::MAX / 2;
 
 /// Sixteen-bit numbers of a row that are looked at together.

@@ -88,7 +88,7 @@ namespace iine
       enum DistanceMetric
       {
         DISTANCE_METRIC_EUCLIDEAN, ///< exact
-        DISTANCE_METRIC_CHAMFER    ///< Borgefors' 3-4 chamfer distance, at most 8 % off
+        DISTANCE_METRIC_CHAMFER    ///< Borgefors' 3-4 chamfer distance, at most 6 % off
       };
 
       /** \brief What a point's depth is with SEMANTICS_PAPER. Not in PCL's class. */

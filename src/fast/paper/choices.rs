@@ -442,7 +442,7 @@ impl<S: Along> Found<'_, S> {
                 let cost = these.cost(pixels, noise);
                 S::store(candidates.cost.0.as_mut_ptr(), cost.0);
                 let better = S::lt(cost.0, least.0);
-                // Few are.
+                // Mostly none is.
                 if S::bits(better) != 0 {
                     least.0 = S::select(better, (alike * cost).0, least.0);
                     best = S::select(better, S::splat(number as f32), best);
@@ -458,7 +458,7 @@ impl<S: Along> Found<'_, S> {
                 let is_better = S::lt(cost.0, least.0);
                 let crease = Crease::between(&these, &first, noise);
                 let better = S::and(is_better, crease.is_first_side(pixels.ray));
-                // Few are.
+                // Mostly none is.
                 if S::bits(better) != 0 {
                     least.0 = S::select(better, (alike * cost).0, least.0);
                     best = S::select(better, S::splat(number as f32), best);
