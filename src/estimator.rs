@@ -192,9 +192,9 @@ impl Estimator {
             }
             Semantics::Paper => paper::estimate_window(points, &self.options, (x, y), size),
         };
-        let towards = turn_to_viewpoint(found.normal, points.at(x, y), self.options.viewpoint);
+        let found = turn_to_viewpoint(found, points.at(x, y), self.options.viewpoint);
         // SAFETY: `normal` has this one element, and no other thread is at work.
-        unsafe { normal.write(0, 0, towards, found.curvature) };
+        unsafe { normal.write(0, 0, found.normal, found.curvature) };
         Ok(())
     }
 
@@ -552,9 +552,7 @@ impl<'a> Plain<'a> {
         }
         let (points, image) = (self.points, &self.image);
         let found = estimate_window(self.options.method, points, image, (x, y), (side, side));
-        let point = self.points.at(x, y);
-        let normal = turn_to_viewpoint(found.normal, point, self.options.viewpoint);
-        Estimate { normal, ..found }
+        turn_to_viewpoint(found, self.points.at(x, y), self.options.viewpoint)
     }
 
     /// The eigenvalues of the covariance matrices of all pixels' windows.

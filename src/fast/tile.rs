@@ -554,8 +554,7 @@ impl Tile<'_> {
             let (points, image) = (self.points, self.image);
             let found = estimate_window(self.options.method, points, image, pixel, (side, side));
             let point = self.points.at(pixel.0, pixel.1);
-            let normal = turn_to_viewpoint(found.normal, point, self.options.viewpoint);
-            estimates.put(lane, Estimate { normal, ..found });
+            estimates.put(lane, turn_to_viewpoint(found, point, self.options.viewpoint));
         }
     }
 

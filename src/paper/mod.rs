@@ -163,7 +163,5 @@ pub(crate) fn of_radius(
     let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
     let rect = window(pixel, radius as usize, points.width(), points.height());
     let found = methods::estimate(options.method, &cleaned, &rect);
-    let point = points.at(pixel.0, pixel.1);
-    let normal = turn_to_viewpoint(found.normal, point, options.viewpoint);
-    Estimate { normal, ..found }
+    turn_to_viewpoint(found, points.at(pixel.0, pixel.1), options.viewpoint)
 }

@@ -196,9 +196,8 @@ impl SecondPass {
     /// The estimate of a pixel, turned to the viewpoint, that takes an even window.
     pub fn chosen(&self, cloud: &Cloud, options: &Options, at: usize) -> Option<Estimate> {
         let choice = Some(self.choices[at]).filter(|choice| *choice != NO_WINDOW)?;
-        let found: Estimate = self.windows.of_even[choice as usize].into();
-        let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
-        Some(Estimate { normal, ..found })
+        let found = self.windows.of_even[choice as usize].into();
+        Some(turn_to_viewpoint(found, cloud.points[at], options.viewpoint))
     }
 
     /// The estimate, in the paper's semantics, of a pixel that could take an even window but takes none.
@@ -224,10 +223,10 @@ impl SecondPass {
         let depth = cloud.depths[at];
         let same = |difference, distance| !is_depth_change(depth, difference, distance, options);
         let found = surroundings::plane_around(cloud, pixel, same)?;
-        let normal = turn_to_viewpoint(found.normal, cloud.points[at], options.viewpoint);
         let has_curvature = options.method == Method::CovarianceMatrix;
         let curvature = if has_curvature { found.curvature } else { f32::NAN };
-        Some(Estimate { normal, curvature })
+        let found = Estimate { curvature, ..found };
+        Some(turn_to_viewpoint(found, cloud.points[at], options.viewpoint))
     }
 }
 

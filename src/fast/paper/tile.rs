@@ -360,8 +360,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
     #[cold]
     fn plain(&self, points: &Cleaned, (x, y): (usize, usize), rect: &Rect) -> Estimate {
         let found = plain_estimate(self.options.method, points, rect);
-        let normal = turn_to_viewpoint(found.normal, points.at(x, y), self.options.viewpoint);
-        Estimate { normal, ..found }
+        turn_to_viewpoint(found, points.at(x, y), self.options.viewpoint)
     }
 }
 
