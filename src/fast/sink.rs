@@ -36,20 +36,6 @@ impl<'a> Sink<'a> {
         Ok(Sink::Listed { normals, listed, width })
     }
 
-    /// The listed pixels among as many as there are lanes from `(x, y)` on, with their elements.
-    fn listed(&self, x: usize, y: usize) -> &[(u32, u32)] {
-        match self {
-            Sink::All(_) => &[],
-            Sink::Listed { listed, width, .. } => {
-                let first = y * width + x;
-                let start = listed.partition_point(|(pixel, _)| (*pixel as usize) < first);
-                let rest = &listed[start..];
-                let end = rest.partition_point(|(pixel, _)| (*pixel as usize) < first + LANES);
-                &rest[..end]
-            }
-        }
-    }
-
     /// Writes these `lanes` of some estimates, for the pixels from `(x, y)` on. Row by row, `columns` are written.
     ///
     /// # Safety
@@ -78,9 +64,11 @@ impl<'a> Sink<'a> {
                     }
                 }
             },
-            Sink::Listed { normals, width, .. } => {
-                for (pixel, element) in self.listed(x, y) {
-                    let lane = *pixel as usize - (y * width + x);
+            Sink::Listed { normals, listed, width } => {
+                let first = y * width + x;
+                let start = listed.partition_point(|(pixel, _)| (*pixel as usize) < first);
+                let rest = listed[start..].iter().map(|(pixel, at)| (*pixel as usize - first, at));
+                for (lane, element) in rest.take_while(|(lane, _)| *lane < LANES) {
                     if lanes >> lane & 1 == 1 {
                         let normal = normal(lane);
                         // SAFETY: as the caller's; every listed element is one of the normals.
