@@ -5,7 +5,7 @@ use super::depth::Depth;
 use super::half_windows::{HalfWindows, Tangents};
 use super::planes::{Frame, Planes};
 use super::run::OfRun;
-use super::tile::{Pair, Tile, contains};
+use super::tile::{Pair, Tile, all, contains};
 use crate::simd::{GROUP, Groups, Simd};
 
 /// [`Sums::note`](super::tile::Sums::note)
@@ -62,7 +62,7 @@ impl<'a, S: Groups> Group<'a, S> {
     #[inline(always)]
     unsafe fn new(pair: &Pair<'a>, lane: usize) -> Self {
         let (x, y, row) = (pair.x + lane, pair.y, pair.row);
-        let windows = pair.windows >> lane & ((1 << GROUP) - 1);
+        let windows = pair.windows >> lane & all(GROUP);
         // SAFETY: as the caller's.
         unsafe {
             // A window of an odd side has the sums of the next smaller one's.

@@ -6,7 +6,7 @@ use super::buffer::Buffer;
 use super::lanes::LANES;
 use super::planes::{Frame, MARGIN, Planes, sum_between};
 use super::run::{Noted, OfRun, RUN};
-use super::tile::{Bits, Found, Pair, Sums, Tile};
+use super::tile::{Bits, Found, Pair, Sums, Tile, all};
 use crate::Error;
 use crate::cloud::Points;
 use crate::eigen::{Symmetric3, eigen};
@@ -358,7 +358,7 @@ impl Sums for Moments {
         let mut plain = 0;
         for first in (0..LANES).step_by(GROUP) {
             let [lanes, inside] =
-                [pair.windows, all_inside].map(|lanes| lanes >> first & ((1 << GROUP) - 1));
+                [pair.windows, all_inside].map(|lanes| lanes >> first & all(GROUP));
             if lanes == 0 {
                 continue;
             }

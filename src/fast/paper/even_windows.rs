@@ -12,7 +12,7 @@ use crate::fast::lanes::LANES;
 use crate::fast::moments::Matrices;
 use crate::fast::run::RUN;
 use crate::fast::sink::Sink;
-use crate::fast::tile::Bits;
+use crate::fast::tile::{Bits, all};
 use crate::paper::{
     Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, MIDDLE, Plane,
     even_window, middle,
@@ -205,10 +205,9 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
                 // SAFETY: as the caller's.
                 unsafe {
                     let windows = self.even.windows.part(blocks);
-                    let mut asked = (1 << windows.len()) - 1;
+                    let mut asked = all(windows.len());
                     if is_later {
-                        let waits = |lane: &usize| windows[*lane].radius == WAITS;
-                        asked = Bits(asked).filter(waits).fold(0, |all, lane| all | 1 << lane);
+                        asked = Bits(asked).which(|lane| windows[lane].radius == WAITS);
                     }
                     if asked == 0 {
                         continue;

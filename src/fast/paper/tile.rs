@@ -382,13 +382,12 @@ unsafe fn with_hidden<S: Groups, M: Sums<N>, const N: usize>(
     if M::ENDS {
         // SAFETY: as the caller's.
         let each = unsafe { rects.each() };
-        let is_hidden = |lane: &usize| {
-            let ends = [0, 1].map(|line| each.outermost(rings, line, *lane));
+        hidden |= Bits(lanes & !hidden).which(|lane| {
+            let ends = [0, 1].map(|line| each.outermost(rings, line, lane));
             ends.iter()
                 .flatten()
                 .any(|(ends, _)| ends.iter().any(|end| rings.field(*end, WEIGHT) < 1.0))
-        };
-        hidden |= Bits(lanes & !hidden).filter(is_hidden).fold(0, |all, lane| all | 1 << lane);
+        });
     }
     hidden
 }

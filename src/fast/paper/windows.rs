@@ -11,6 +11,7 @@ use super::depths::row_length;
 use crate::Error;
 use crate::fast::buffer::Buffer;
 use crate::fast::lanes::{LANES, Lanes};
+use crate::fast::tile::Bits;
 use crate::options::PaperOptions;
 use crate::simd::Simd;
 
@@ -181,12 +182,10 @@ impl Sweep {
                 let change = is_change::<S>(depth, next, S::splat(1.0), options);
                 S::store(right.as_mut_ptr().add(x), change);
                 let there = S::bits(S::eq(depth, depth));
-                let mut behind_gap = there & !(there << 1 | before);
+                let behind_gap = there & !(there << 1 | before);
                 before = there >> (LANES - 1);
-                while behind_gap != 0 {
-                    let at = x + behind_gap.trailing_zeros() as usize;
-                    behind_gap &= behind_gap - 1;
-                    mark_gap(depths, at, options, right);
+                for lane in Bits(behind_gap) {
+                    mark_gap(depths, x + lane, options, right);
                 }
             }
         }
