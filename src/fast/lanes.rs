@@ -170,17 +170,12 @@ impl LaneOrder {
 ///
 /// # Safety
 /// `from` is valid for reads, `to` for writes of four floats at each of four rows.
-#[cfg(target_arch = "x86_64")]
 #[inline(always)]
-pub(crate) unsafe fn transpose4(
-    from: *const f32,
-    from_stride: usize,
-    to: *mut f32,
-    to_stride: usize,
-) {
-    use std::arch::x86_64::*;
+unsafe fn transpose4(from: *const f32, from_stride: usize, to: *mut f32, to_stride: usize) {
     // SAFETY: promised by the caller; SSE is part of every x86-64.
+    #[cfg(target_arch = "x86_64")]
     unsafe {
+        use std::arch::x86_64::*;
         let [a, b, c, d] = [0, 1, 2, 3].map(|row| _mm_loadu_ps(from.add(row * from_stride)));
         let (ab_low, cd_low) = (_mm_unpacklo_ps(a, b), _mm_unpacklo_ps(c, d));
         let (ab_high, cd_high) = (_mm_unpackhi_ps(a, b), _mm_unpackhi_ps(c, d));
@@ -189,20 +184,7 @@ pub(crate) unsafe fn transpose4(
         _mm_storeu_ps(to.add(2 * to_stride), _mm_movelh_ps(ab_high, cd_high));
         _mm_storeu_ps(to.add(3 * to_stride), _mm_movehl_ps(cd_high, ab_high));
     }
-}
-
-/// Transposes 4 x 4 floats; the strides of the rows count floats.
-///
-/// # Safety
-/// `from` is valid for reads, `to` for writes of four floats at each of four rows.
-#[cfg(not(target_arch = "x86_64"))]
-#[inline(always)]
-pub(crate) unsafe fn transpose4(
-    from: *const f32,
-    from_stride: usize,
-    to: *mut f32,
-    to_stride: usize,
-) {
+    #[cfg(not(target_arch = "x86_64"))]
     for row in 0..4 {
         for column in 0..4 {
             // SAFETY: promised by the caller.
