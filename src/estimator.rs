@@ -561,7 +561,7 @@ impl<'a> Plain<'a> {
             let side = self.window_side(x, y) as usize;
             let first = (start(x, side), start(y, side));
             let rects = self.image.rects(first, (side, side));
-            (side > 0).then(|| rects.map(|rect| paper::Rect { x: rect.x, y: rect.y }))
+            (side > 0).then(|| rects.map(|(rect, _)| rect))
         };
         let Image { width, height, .. } = self.image;
         let sides = (0..width * height).map(|at| self.window_side(at % width, at / width));

@@ -3,30 +3,7 @@
 use std::ops::Range;
 
 use crate::options::BorderPolicy;
-
-/// A rectangle of pixels inside the image.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Rect {
-    pub x: Range<usize>,
-    pub y: Range<usize>,
-    /// 1, or -1 where mirroring takes the pixels away: only for windows that start outside the image.
-    pub sign: i32,
-}
-
-impl Rect {
-    pub fn pixels(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
-        let Rect { x: columns, y: rows, .. } = self.clone();
-        rows.flat_map(move |y| columns.clone().map(move |x| (x, y)))
-    }
-
-    /// The part inside the image without its outermost rows and columns.
-    pub fn inside_frame(&self, image: &Image) -> Rect {
-        let clip = |range: &Range<usize>, size: usize| {
-            range.start.max(1)..range.end.min(size.saturating_sub(1))
-        };
-        Rect { x: clip(&self.x, image.width), y: clip(&self.y, image.height), sign: self.sign }
-    }
-}
+use crate::paper::Rect;
 
 /// The image's size and what windows do at its border.
 #[derive(Clone, Debug)]
@@ -37,23 +14,32 @@ pub(crate) struct Image {
 }
 
 impl Image {
-    /// The rectangles that make up a window which may cross the border, none empty; a pixel in two of them counts
-    /// twice, and one in a rectangle of negative sign is taken away.
+    /// The rectangles that make up a window which may cross the border, none empty, with their signs; a pixel in two of them
+    /// counts twice, and one in a rectangle of sign -1 is taken away: mirroring does so to windows that start outside the
+    /// image.
     ///
     /// With [`BorderPolicy::Ignore`] the window is clipped (PCL reads out of bounds there).
     pub fn rects(
         &self,
         start: (isize, isize),
         size: (usize, usize),
-    ) -> impl Iterator<Item = Rect> + Clone + use<> {
+    ) -> impl Iterator<Item = (Rect, i32)> + Clone + use<> {
         let columns = fold(start.0, size.0, self.width, self.border_policy).map(in_order);
         let rows = fold(start.1, size.1, self.height, self.border_policy).map(in_order);
         // One by one: most are empty.
         (0..4).filter_map(move |k| {
             let ((x, along), (y, down)) = (&columns[k % 2], &rows[k / 2]);
             let is_empty = x.is_empty() || y.is_empty();
-            (!is_empty).then(|| Rect { x: x.clone(), y: y.clone(), sign: along * down })
+            (!is_empty).then(|| (Rect { x: x.clone(), y: y.clone() }, along * down))
         })
+    }
+
+    /// The part of a rectangle without the image's outermost rows and columns.
+    pub fn inside_frame(&self, rect: &Rect) -> Rect {
+        let clip = |range: &Range<usize>, size: usize| {
+            range.start.max(1)..range.end.min(size.saturating_sub(1))
+        };
+        Rect { x: clip(&rect.x, self.width), y: clip(&rect.y, self.height) }
     }
 
     /// A pixel that may lie outside the image, brought back inside: mirrored as PCL does, or clamped.
@@ -117,11 +103,8 @@ mod tests {
     #[test]
     fn a_window_that_starts_behind_the_image_takes_its_last_column_away() {
         let image = Image { width: 10, height: 6, border_policy: BorderPolicy::Mirror };
-        let rects: Vec<Rect> = image.rects((10, 1), (3, 2)).collect();
-        assert_eq!(
-            rects,
-            [Rect { x: 9..10, y: 1..3, sign: -1 }, Rect { x: 6..9, y: 1..3, sign: 1 }]
-        );
+        let rects: Vec<_> = image.rects((10, 1), (3, 2)).collect();
+        assert_eq!(rects, [(Rect { x: 9..10, y: 1..3 }, -1), (Rect { x: 6..9, y: 1..3 }, 1)]);
     }
 
     #[test]

@@ -11,8 +11,9 @@ use super::run::OfRun;
 use super::tile::{Found, Pair, Sums, Tile};
 use crate::Error;
 use crate::memory::{bytes, make_room};
+use crate::paper::Rect;
 use crate::simd::{Groups, Simd};
-use crate::window::{Image, Rect};
+use crate::window::Image;
 
 /// The ring of integral rows of z.
 #[derive(Debug, Default)]
@@ -156,10 +157,10 @@ impl<T: Depth> HalfWindows<T> {
         let (x, y) = (x as isize, y as isize);
         let mean = |start: (isize, isize)| {
             let (mut sum, mut count) = (T::default(), 0_i32);
-            for rect in image.rects(start, (half, half)) {
+            for (rect, sign) in image.rects(start, (half, half)) {
                 let of_rect = self.sum(frame, &rect);
-                sum = if rect.sign > 0 { sum.plus(of_rect) } else { sum.minus(of_rect) };
-                count += rect.sign * (rect.x.len() * rect.y.len()) as i32;
+                sum = if sign > 0 { sum.plus(of_rect) } else { sum.minus(of_rect) };
+                count += sign * rect.area() as i32;
             }
             (count > 0).then(|| sum.about(own, count) / (scale * f64::from(count)))
         };

@@ -204,8 +204,8 @@ impl Moments {
         let half = (side / 2) as isize;
         (*most, *z) = ([0.0; GROUP], 0.0);
         let mut count = 0;
-        for rect in image.rects((x as isize - half, y as isize - half), (side, side)) {
-            count += rect.x.len() * rect.y.len();
+        for (rect, _) in image.rects((x as isize - half, y as isize - half), (side, side)) {
+            count += rect.area();
             for (sign, end_row) in [(1.0, rect.y.end), (-1.0, rect.y.start)] {
                 if end_row == 0 {
                     continue;
@@ -395,7 +395,7 @@ impl Sums for Moments {
             let ((x, y), side) = windows(lane);
             let half = (side / 2) as isize;
             let window = (x as isize - half, y as isize - half);
-            let pixels = image.rects(window, (side, side)).flat_map(|rect| rect.pixels());
+            let pixels = image.rects(window, (side, side)).flat_map(|(rect, _)| rect.pixels());
             sum_of_moments(pixels.map(|(x, y)| points.at(x, y).map(f64::from)))
         };
         // SAFETY: as the caller's.

@@ -109,8 +109,8 @@ impl StripPairs {
         let half = (side / 2) as isize;
         // Those of each rectangle fit, those of all might not.
         let mut sums = [0_i64; GROUP];
-        for rect in image.rects((x as isize - half, y as isize - half), (side, side)) {
-            let inside = rect.inside_frame(image);
+        for (rect, _) in image.rects((x as isize - half, y as isize - half), (side, side)) {
+            let inside = image.inside_frame(&rect);
             if inside.x.is_empty() || inside.y.is_empty() {
                 continue;
             }

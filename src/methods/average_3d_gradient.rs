@@ -16,9 +16,9 @@ pub(crate) fn estimate(
 ) -> Estimate {
     let mut horizontal = Gradient::default();
     let mut vertical = Gradient::default();
-    for rect in image.rects((start(x, width), start(y, height)), (width, height)) {
-        let inside = rect.inside_frame(image);
-        let frame = rect.pixels().count() - inside.pixels().count();
+    for (rect, _) in image.rects((start(x, width), start(y, height)), (width, height)) {
+        let inside = image.inside_frame(&rect);
+        let frame = rect.area() - inside.area();
         horizontal.count += frame;
         vertical.count += frame;
         for (x, y) in inside.pixels() {

@@ -22,12 +22,12 @@ pub(crate) fn estimate(
     let (x, y) = (x as isize, y as isize);
     let mean_z = |start| {
         let (mut sum, mut count) = (0.0, 0_i32);
-        for rect in image.rects(start, half) {
+        for (rect, sign) in image.rects(start, half) {
             for (x, y) in rect.pixels() {
                 let z = points.z(x, y);
                 if z.is_finite() {
-                    sum += f64::from(rect.sign) * f64::from(z);
-                    count += rect.sign;
+                    sum += f64::from(sign) * f64::from(z);
+                    count += sign;
                 }
             }
         }

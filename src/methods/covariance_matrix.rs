@@ -17,7 +17,7 @@ pub(crate) fn estimate(
 ) -> Estimate {
     let window = (start(x, width), start(y, height));
     let rects = image.rects(window, (width, height));
-    let pixels = || rects.clone().flat_map(|rect| rect.pixels());
+    let pixels = || rects.clone().flat_map(|(rect, _)| rect.pixels());
     Scatter::of(|| pixels().filter_map(|pixel| finite_point(points, pixel)))
         .map_or(Estimate::NONE, |scatter| from_covariance(&scatter.matrix))
 }

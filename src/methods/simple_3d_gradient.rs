@@ -18,7 +18,7 @@ pub(crate) fn estimate(
     let (right, bottom) = (x as isize + (width / 2) as isize, y as isize + (height / 2) as isize);
     let strip = |start, size| {
         let mut sum = [0.0; 3];
-        for rect in image.rects(start, size) {
+        for (rect, _) in image.rects(start, size) {
             for (x, y) in rect.pixels() {
                 let point = points.at(x, y);
                 if is_finite(point) {
