@@ -184,7 +184,7 @@ fn zeros_that_are_missing_are_as_nan() {
                     let mut missing = Estimator::with_isa(options.clone(), Isa::Scalar);
                     let found = compute(&mut missing, &zeros);
                     let maps = all_maps(&mut missing, &zeros);
-                    let window = window(&mut missing, &zeros);
+                    let window = window(&mut missing, &zeros, (20, 16), (21, 17));
 
                     options.zero_is_missing = false;
                     let mut plain = Estimator::with_isa(options, Isa::Scalar);
@@ -192,7 +192,7 @@ fn zeros_that_are_missing_are_as_nan() {
                     assert_same_bits(&found, &expected, zeros.width, &what);
                     assert_eq!(bits(&maps), bits(&all_maps(&mut plain, &nans)), "{what}");
                     // A pixel that is a zero itself has a side towards the viewpoint, one that is NaN has none.
-                    let expected = self::window(&mut plain, &nans);
+                    let expected = self::window(&mut plain, &nans, (20, 16), (21, 17));
                     let same = |sign: f32| {
                         (0..3).all(|i| window[i].to_bits() == (sign * expected[i]).to_bits())
                             || window[0].is_nan() && expected[0].is_nan()
@@ -205,11 +205,16 @@ fn zeros_that_are_missing_are_as_nan() {
     }
 }
 
-/// One pixel's normal over a window of 21 x 17.
-fn window(estimator: &mut Estimator, cloud: &Cloud) -> [f32; 4] {
+/// One pixel's normal over a window of this size.
+fn window(
+    estimator: &mut Estimator,
+    cloud: &Cloud,
+    pixel: (usize, usize),
+    size: (u32, u32),
+) -> [f32; 4] {
     let mut found = [7.0; 4];
     let mut normal = Normals::interleaved(&mut found, 1, 1, 4, 0, Some(3)).unwrap();
-    estimator.compute_window(&cloud.view(), (20, 16), (21, 17), &mut normal).unwrap();
+    estimator.compute_window(&cloud.view(), pixel, size, &mut normal).unwrap();
     found
 }
 
@@ -230,9 +235,7 @@ fn windows_of_the_papers_methods() {
         for at in (0..pixels).filter(|at| areas[*at] > 0.0) {
             let side = 2 * areas[at] as u32 + 1;
             let pixel = (at % cloud.width, at / cloud.width);
-            let mut found = [7.0; 4];
-            let mut normal = Normals::interleaved(&mut found, 1, 1, 4, 0, Some(3)).unwrap();
-            estimator.compute_window(&cloud.view(), pixel, (side, side), &mut normal).unwrap();
+            let found = window(&mut estimator, &cloud, pixel, (side, side));
             for (a, b) in found.iter().zip(whole[at]) {
                 assert!((a - b).abs() < 1e-5 || a.is_nan() && b.is_nan(), "{method:?} {pixel:?}");
             }
@@ -241,15 +244,11 @@ fn windows_of_the_papers_methods() {
         assert!(compared > pixels / 2);
         for size in [(0, 0), (0, 5), (5, 0), (1, 1)] {
             for pixel in [(0, 0), (40, 32)] {
-                let mut found = [7.0; 4];
-                let mut normal = Normals::interleaved(&mut found, 1, 1, 4, 0, Some(3)).unwrap();
-                estimator.compute_window(&cloud.view(), pixel, size, &mut normal).unwrap();
+                let found = window(&mut estimator, &cloud, pixel, size);
                 assert!(found.iter().all(|c| c.is_nan()), "{method:?} {size:?}: {found:?}");
             }
         }
-        let mut found = [7.0; 4];
-        let mut normal = Normals::interleaved(&mut found, 1, 1, 4, 0, Some(3)).unwrap();
-        estimator.compute_window(&cloud.view(), (3, 4), (u32::MAX, u32::MAX), &mut normal).unwrap();
+        let found = window(&mut estimator, &cloud, (3, 4), (u32::MAX, u32::MAX));
         assert!(found[..3].iter().all(|c| c.is_finite()));
     }
 }

@@ -2,7 +2,9 @@
 
 mod clouds;
 
-use clouds::{Cloud, Kind, Random, angle, compute, fast_isas, methods, normal, options};
+use clouds::{
+    Cloud, Kind, Random, angle, compute, compute_listed, fast_isas, methods, normal, options,
+};
 use iine::{
     BorderPolicy, Depth, DistanceMetric, Estimator, Isa, Maps, Method, Normals, Options, Semantics,
 };
@@ -122,9 +124,7 @@ fn nothing_panics() {
             }
         }
         let index = random.below(cloud.points.len()) as i32;
-        let mut one = [0.0; 4];
-        let mut normal = Normals::interleaved(&mut one, 1, 1, 4, 0, Some(3)).unwrap();
-        estimator.compute_indices(&cloud.view(), &[index], &mut normal).unwrap();
+        let one = compute_listed(&mut estimator, &cloud, &[index])[0];
         assert_eq!(one.map(f32::to_bits), fast[index as usize].map(f32::to_bits));
     }
     println!("{clouds} clouds");
@@ -191,9 +191,7 @@ fn nothing_panics_beyond_pcl() {
         }
 
         let index = random.below(cloud.points.len());
-        let mut one = [7.0; 4];
-        let mut normal = Normals::interleaved(&mut one, 1, 1, 4, 0, Some(3)).unwrap();
-        estimator.compute_indices(&cloud.view(), &[index as i32], &mut normal).unwrap();
+        let mut one = compute_listed(&mut estimator, &cloud, &[index as i32])[0];
         assert_eq!(one.map(f32::to_bits), found[index].map(f32::to_bits), "{}", what(index));
         let mut normal = Normals::interleaved(&mut one, 1, 1, 4, 0, Some(3)).unwrap();
         let pixel = (index % cloud.width, index / cloud.width);
@@ -277,11 +275,7 @@ fn points_for_no_return_spoil_no_normal_elsewhere() {
         for (seed, (across, down)) in [(1, 1), (37, 23), (width, 31)].into_iter().enumerate() {
             for (x, y) in [(30, 20), (70, 59)] {
                 let mut cloud = Cloud::new(Kind::Wavy, width, height, seed as u64);
-                for row in y..(y + down).min(height) {
-                    for column in x..(x + across).min(width) {
-                        cloud.points[row * width + column] = [0.0, 0.0, depth];
-                    }
-                }
+                cloud.fill(x..x + across, y..y + down, [0.0, 0.0, depth]);
                 for method in methods() {
                     assert_as_plain(&cloud, &options(method, 8.0, false));
                 }
