@@ -490,7 +490,7 @@ impl Group<'_> {
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn candidates<S: Along>(&self, found: &mut Found<'_, S>) {
-        let &Group { even, row, blocks, .. } = self;
+        let &Group { even, row, blocks } = self;
         let Blocks { across, down, .. } = even.asked.blocks;
         let &Cloud { width, height, .. } = even.cloud;
         let (mut levels, mut radii) = (Lanes::ZERO, Lanes::ZERO);
@@ -616,16 +616,6 @@ impl Group<'_> {
             }
         }
     }
-}
-
-/// How far a column or row of a block is from its middle.
-///
-/// # Safety
-/// The processor has the instruction set of `S`.
-#[inline(always)]
-unsafe fn from_middle<S: Simd>(line: usize) -> Floats<S> {
-    // SAFETY: as the caller's.
-    unsafe { Floats::splat(line as f32 - MIDDLE as f32) }
 }
 
 /// Whether and where the planes of two windows of each block meet between the middles of both.
@@ -886,9 +876,10 @@ impl Rows {
                     let [x, y, z] = points[column];
                     let z = if cloud.has_range { z * inverse_depth } else { Floats(one) };
                     let number = line * BLOCK + column;
+                    let [dx, dy] = [column, line].map(|line| line as f32 - MIDDLE as f32);
                     to.add(number).write(Pixels {
                         number: Floats::splat(number as f32),
-                        at: [from_middle(column), from_middle(line)],
+                        at: [Floats::splat(dx), Floats::splat(dy)],
                         there: Floats(S::eq(depth, depth)),
                         ray: [x * inverse_depth, y * inverse_depth, z],
                         inverse_depth,
