@@ -168,7 +168,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
                     );
                 }
                 if has_middles {
-                    some_wait |= self.row::<S>(rings, &method, &mut of_even, first, error);
+                    some_wait |= self.row::<S>(rings, &mut of_even, first, error);
                 }
             }
         }
@@ -184,7 +184,6 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
     unsafe fn row<S: Groups>(
         &self,
         rings: &Rings<MOMENTS>,
-        method: &CovarianceMatrix,
         run: &mut Run<Matrices>,
         first: usize,
         error: f64,
@@ -213,8 +212,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
                         continue;
                     }
                     let eight = Eight { pixels, block, asked, error };
-                    let (found, hidden) =
-                        self.eight::<S>(rings, method, &eight, windows, run, group);
+                    let (found, hidden) = self.eight::<S>(rings, &eight, windows, run, group);
                     some_wait |= hidden != 0;
                     if self.even.normals.is_some() && found != 0 {
                         let at = group * GROUP;
@@ -243,22 +241,21 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
     unsafe fn eight<S: Groups>(
         &self,
         rings: &Rings<MOMENTS>,
-        method: &CovarianceMatrix,
         eight: &Eight,
         windows: &mut [EvenWindow],
         run: &mut Run<Matrices>,
         group: usize,
     ) -> (u32, u32) {
-        let Even { cloud, asked: windows_asked, .. } = self.even;
+        let Even { cloud, asked: of_image, .. } = self.even;
         let &Eight { pixels, block, asked, .. } = eight;
         let y = rings.aimed.y;
         let hides_some = rings.layer.hides_some();
         let [mut wanted, mut clean] = [[0.0; GROUP]; 2];
         let of_blocks = block..block + windows.len();
-        for (to, from) in wanted.iter_mut().zip(&windows_asked.wanted[of_blocks.clone()]) {
+        for (to, from) in wanted.iter_mut().zip(&of_image.wanted[of_blocks.clone()]) {
             *to = *from as f32;
         }
-        for (to, from) in clean.iter_mut().zip(&windows_asked.clean.radii[of_blocks]) {
+        for (to, from) in clean.iter_mut().zip(&of_image.clean.radii[of_blocks]) {
             *to = f32::from(*from);
         }
         // SAFETY: as the caller's.
@@ -266,11 +263,11 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
             let [wanted, clean] =
                 [Floats::<S>::load(wanted.as_ptr()), Floats::load(clean.as_ptr())];
             // As `Asked::largest` has it.
-            let limit = Floats::<S>::splat(windows_asked.limit as f32);
+            let limit = Floats::<S>::splat(of_image.limit as f32);
             let largest = S::min((wanted + wanted).0, S::min(limit.0, clean.0));
             let largest = Floats(S::and(S::mask(asked), largest));
             let (zero, one) = (Floats::<S>::splat(0.0), Floats::<S>::splat(1.0));
-            let least = Doubles::splat(f64::from(self.even.asked.least_noise));
+            let least = Doubles::splat(f64::from(of_image.least_noise));
             let smallest = Floats::splat(JAGGED_RADIUS as f32 - 1.0);
             // On steep surfaces, windows with depth changes; then, or else, windows without, and smaller ones while those
             // are much more even.
@@ -287,7 +284,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
                     // What rounding could decide is left to the plain form.
                     let mut plain = [0.0; GROUP];
                     for lane in Bits(asked & doubtful & !hidden & !decided) {
-                        let window = even_window(cloud, self.even.asked, block + lane);
+                        let window = even_window(cloud, of_image, block + lane);
                         windows[lane] = window.unwrap_or_default();
                         plain[lane] = windows[lane].radius;
                         decided |= 1 << lane;
@@ -301,7 +298,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
                 }
                 let rects = Rects::new(rings, &pixels, radii, todo, None);
                 let sums = rects.sums(rings, 0);
-                let fits = self.fits(method, &sums, eight.error);
+                let fits = self.fits(rings.layer.origin, &sums, eight.error);
                 if decided != 0 {
                     best.take(todo, &fits);
                     break;
@@ -337,14 +334,15 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
         }
     }
 
-    /// Planes through the points of eight windows, as [`Plane::of`], from their sums, the errors of which stay below `error`.
+    /// Planes through the points of eight windows, as [`Plane::of`], from their sums about `origin`, the errors of which stay
+    /// below `error`.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn fits<S: Groups>(
         &self,
-        method: &CovarianceMatrix,
+        origin: [f32; 3],
         sums: &[Doubles<S>; MOMENTS],
         error: f64,
     ) -> Fits<S> {
@@ -357,7 +355,7 @@ impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
             let (xy, yz, xz) = (xy * share - x * y, yz * share - y * z, xz * share - x * z);
             let mut m = [x, y, z];
             for c in 0..3 {
-                m[c] = m[c] + Doubles::splat(method.origin[c]);
+                m[c] = m[c] + Doubles::splat(origin[c].into());
             }
             let [axx, axy, axz] = [yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy];
             let [ayy, ayz, azz] = [xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy];

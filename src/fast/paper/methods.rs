@@ -73,7 +73,7 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
 
 /// CM: moments about a point of the tile.
 pub(crate) struct CovarianceMatrix {
-    pub origin: [f64; 3],
+    origin: [f64; 3],
 }
 
 impl CovarianceMatrix {
