@@ -90,7 +90,7 @@ impl<T: Depth> HalfWindows<T> {
             if end_row == 0 {
                 return T::default();
             }
-            let row = frame.place(end_row - 1) * frame.stride;
+            let row = frame.start(1, end_row - 1);
             let to = |x: usize| self.integrals[row + frame.column(x) - 1];
             to(rect.x.end).minus(to(rect.x.start))
         };

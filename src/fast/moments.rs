@@ -248,10 +248,9 @@ impl<S: Groups> WindowMoments<S> {
     unsafe fn of_rows(rows: [S::D; GROUP], z: Doubles<S>, share: Doubles<S>) -> Self {
         // SAFETY: as the caller's.
         let [xx, xy, xz, yy, yz, zz, x, y] = unsafe { S::transpose_d(rows) };
-        let doubles = |lanes| Doubles(lanes);
-        let (x, y) = (doubles(x), doubles(y));
-        let (xx, xy, xz) = (doubles(xx), doubles(xy), doubles(xz));
-        let (yy, yz, zz) = (doubles(yy), doubles(yz), doubles(zz));
+        let (x, y) = (Doubles(x), Doubles(y));
+        let (xx, xy, xz) = (Doubles(xx), Doubles(xy), Doubles(xz));
+        let (yy, yz, zz) = (Doubles(yy), Doubles(yz), Doubles(zz));
         WindowMoments { sums: [x, y, z, xx, xy, xz, yy, yz, zz], share }
     }
 }

@@ -32,13 +32,11 @@ impl<S: Simd> Found<S> {
     #[inline(always)]
     pub fn take(&mut self, lanes: u32, other: &Self) {
         // SAFETY: there is a group, so there is the instruction set.
-        unsafe {
-            let mask = S::mask(lanes);
-            for c in 0..3 {
-                self.normal[c].0 = S::select(mask, other.normal[c].0, self.normal[c].0);
-            }
-            self.curvature.0 = S::select(mask, other.curvature.0, self.curvature.0);
+        let mask = unsafe { S::mask(lanes) };
+        for c in 0..3 {
+            self.normal[c].take(mask, other.normal[c]);
         }
+        self.curvature.take(mask, other.curvature);
     }
 
     /// Takes those that `precisely` gives for some lanes; returns the others.

@@ -5,6 +5,7 @@ use super::cloud::Cloud;
 use super::rect::Rect;
 use super::summed_area::SummedArea;
 use crate::Error;
+use crate::methods::cross;
 use crate::threads::Workers;
 
 /// Integral images of normals, one for each block.
@@ -125,7 +126,7 @@ fn normal(halves: [[Sum; 2]; 2]) -> Option<[f64; 3]> {
     let [u, v] = halves.map(|[[a, b, c, before], [d, e, f, behind]]| {
         [d * before - a * behind, e * before - b * behind, f * before - c * behind]
     });
-    let normal = [v[1] * u[2] - v[2] * u[1], v[2] * u[0] - v[0] * u[2], v[0] * u[1] - v[1] * u[0]];
+    let normal = cross(v, u);
     let length2 = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
     let scale = 1.0 / length2.sqrt();
     scale.is_finite().then(|| normal.map(|n| n * scale))
