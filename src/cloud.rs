@@ -150,7 +150,7 @@ impl<'a> Points<'a> {
         check_length(data.len(), &grid, 3)?;
         let x = data.as_ptr();
         // SAFETY: `data` is borrowed for 'a, and `check_length` saw that it holds three floats at every pixel.
-        unsafe { Self::from_grid(x, x.wrapping_add(1), x.wrapping_add(2), grid) }
+        unsafe { Self::from_grid([x, x.wrapping_add(1), x.wrapping_add(2)], grid) }
     }
 
     /// Three separate planes; `row_stride` (0 for packed rows, else at least `width`) counts floats.
@@ -167,7 +167,7 @@ impl<'a> Points<'a> {
             check_length(plane.len(), &grid, 1)?;
         }
         // SAFETY: the planes are borrowed for 'a, and `check_length` saw that each holds a float at every pixel.
-        unsafe { Self::from_grid(x.as_ptr(), y.as_ptr(), z.as_ptr(), grid) }
+        unsafe { Self::from_grid([x.as_ptr(), y.as_ptr(), z.as_ptr()], grid) }
     }
 
     /// A view from the addresses of the first pixel's x, y and z. Strides are in bytes, multiples of 4;
@@ -182,22 +182,16 @@ impl<'a> Points<'a> {
         [x, y, z]: [*const f32; 3],
         width: usize,
         height: usize,
-        point_stride: usize,
-        row_stride: usize,
+        [point_stride, row_stride]: [usize; 2],
     ) -> Result<Self, Error> {
         let grid = Grid::new(width, height, point_stride, row_stride)?;
         // SAFETY: promised by the caller.
-        unsafe { Self::from_grid(x, y, z, grid) }
+        unsafe { Self::from_grid([x, y, z], grid) }
     }
 
     /// # Safety
     /// As [`Points::from_raw`].
-    unsafe fn from_grid(
-        x: *const f32,
-        y: *const f32,
-        z: *const f32,
-        grid: Grid,
-    ) -> Result<Self, Error> {
+    unsafe fn from_grid([x, y, z]: [*const f32; 3], grid: Grid) -> Result<Self, Error> {
         for field in [x, y, z] {
             check_field(field, &grid)?;
         }

@@ -626,8 +626,7 @@ fn points_and_normals_may_share_an_array() {
                 // fields are inside it, and disjoint.
                 unsafe {
                     let from = [0, 1, 2].map(|c| place(c).cast_const());
-                    let points =
-                        Points::from_raw(from, width, height, strides[0], strides[1]).unwrap();
+                    let points = Points::from_raw(from, width, height, strides).unwrap();
                     let to = [0, 1, 2].map(|c| place(first + c));
                     let curvature = Some((place(curvature), strides));
                     let mut normals =

@@ -59,7 +59,7 @@ unsafe fn read_points<'a>(points: *const iine_points) -> Result<Points<'a>, Erro
     let p = unsafe { read_sized(points, &[size_of::<iine_points>()]) }?;
     let (width, height) = (p.width as usize, p.height as usize);
     // SAFETY: promised by the caller.
-    unsafe { Points::from_raw([p.x, p.y, p.z], width, height, p.point_stride, p.row_stride) }
+    unsafe { Points::from_raw([p.x, p.y, p.z], width, height, [p.point_stride, p.row_stride]) }
 }
 
 /// # Safety
