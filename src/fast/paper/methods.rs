@@ -303,8 +303,8 @@ impl Sums<4> for SmoothedDepthChanges {
         let [h, h_count, v, v_count] = *sums;
         // SAFETY: as the caller's.
         unsafe {
-            let [hx, hy, h_span] = outermost::<S, _>(rects, rings, 0, lanes);
-            let [vx, vy, v_span] = outermost::<S, _>(rects, rings, 1, lanes);
+            let [hx, hy, h_span] = outermost(rects, rings, 0, lanes);
+            let [vx, vy, v_span] = outermost(rects, rings, 1, lanes);
             // Times twice the number of depth changes, which are over two pixels each.
             let (h_count, v_count) = (h_count.narrow(), v_count.narrow());
             let (h_count, v_count) = (h_count + h_count, v_count + v_count);
@@ -327,9 +327,9 @@ impl Sums<4> for SmoothedDepthChanges {
 /// # Safety
 /// As [`Sums::note`].
 #[inline(always)]
-unsafe fn outermost<S: Groups, const N: usize>(
+unsafe fn outermost<S: Groups>(
     rects: &Rects<S>,
-    rings: &Rings<N>,
+    rings: &Rings<4>,
     line: usize,
     lanes: u32,
 ) -> [Floats<S>; 3] {

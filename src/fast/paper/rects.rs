@@ -163,7 +163,7 @@ impl<S: Groups> Rects<S> {
     /// # Safety
     /// As [`Rects::sums`].
     #[inline(always)]
-    pub unsafe fn ends<const N: usize>(&self, rings: &Rings<N>, line: usize) -> [Floats<S>; 3] {
+    pub unsafe fn ends(&self, rings: &Rings<4>, line: usize) -> [Floats<S>; 3] {
         let (points, plane) = (rings.points(), rings.plane_of_points());
         // SAFETY: as the caller's.
         unsafe {
