@@ -5,7 +5,7 @@ use crate::cloud::{Normals, Points};
 use crate::depth_change::depth_change_map;
 use crate::distance::distance_map;
 use crate::eigenvalues::eigenvalue_map;
-use crate::fast::paper::{Along, Job, Own};
+use crate::fast::paper::{Job, Own, WithEven};
 use crate::fast::{self, SIZES, Scratch};
 use crate::isa::Isa;
 use crate::memory::{refill, resize};
@@ -146,7 +146,7 @@ impl Estimator {
             }
         }
         if self.options.is_beyond_pcl() {
-            return self.second_pass(points, indices, normals);
+            return self.compute_beyond_pcl(points, indices, normals);
         }
         let width = points.width();
         let plain = Plain::new(points, &self.options)?;
@@ -271,7 +271,7 @@ impl Estimator {
     }
 
     /// As [`Estimator::compute_pixels`], where PCL's windows and sums alone are not what is asked for.
-    fn second_pass(
+    fn compute_beyond_pcl(
         &mut self,
         points: &Points,
         indices: Option<&[i32]>,
@@ -486,7 +486,7 @@ impl paper::Engine for Engine<'_> {
         let size = (asked.blocks.across, asked.blocks.down);
         let of_even = normals_of(of_even, size)?;
         let own = self.own.map(|(indices, normals)| Own { concerned, indices, normals });
-        let along = has_normals.then_some(Along { of_even: &of_even, own });
+        let along = has_normals.then_some(WithEven { of_even: &of_even, own });
         // CM's sums are what even windows are made from.
         let options = &Options { method, ..self.job.options.clone() };
         let job = Job { options, ..self.job };

@@ -44,17 +44,17 @@ impl Layer {
 }
 
 /// The layers of an image whose depths' magnitudes are from `nearest` to `deepest`, and how many there are, the farthest
-/// first: one alone if the farthest points are no more than `range` times as deep as the nearest. No window is larger
+/// first: one alone if the farthest points are no more than `span` times as deep as the nearest. No window is larger
 /// than `side`.
 pub(crate) fn layers(
     [nearest, deepest]: [f32; 2],
-    range: f32,
+    span: f32,
     side: usize,
     options: &Options,
 ) -> ([Layer; MOST], usize) {
     let one = ([Layer::all(deepest, side); MOST], 1);
     let (nearest, mut end) = (nearest + 1.0, deepest + 1.0);
-    if end <= range * nearest {
+    if end <= span * nearest {
         return one;
     }
     // From pixel to pixel, depth and 1 grow by this at most.

@@ -1,7 +1,7 @@
 //! The fast form of the whole method: the same steps as the plain form, over lanes, rows and tiles.
 //!
 //! First the windows of a slice of the image's rows (`windows`), then tile by tile, and if need be layer by layer
-//! (`layers`), the points (`planes`, `hidden`), the method's rings of sums (`strip_pairs`, `strips`, `moments`,
+//! (`layers`), the points (`planes`, `incomplete`), the method's rings of sums (`strip_pairs`, `strips`, `moments`,
 //! `half_windows`) and, run by run (`run`), the normals (`tile`). Slices are made of whole strips; strips, tiles and layers
 //! are fixed by the frame and the options, so that results do not depend on the number of threads.
 
@@ -11,7 +11,7 @@ mod by_side;
 mod depth;
 mod gradients;
 mod half_windows;
-mod hidden;
+mod incomplete;
 mod lanes;
 mod layers;
 mod moments;
@@ -360,7 +360,7 @@ impl Job<'_> {
         let columns = self.columns(scale.is_some(), reach);
         scratch.reserve(self, scale.is_some(), columns, side)?;
         let depths = [around.nearest(), around.deepest()];
-        let (layers, count) = layers(depths, self.range(scale.is_some()), side, options);
+        let (layers, count) = layers(depths, self.span(scale.is_some()), side, options);
         for column in (0..width).step_by(columns) {
             let tile = &Tile {
                 points,
@@ -380,7 +380,7 @@ impl Job<'_> {
 
     /// How many times as deep as the nearest points others may be for the method's sums, of integers or not, to be fine
     /// enough for both: found by trying, as more layers take more time.
-    fn range(&self, is_integer: bool) -> f32 {
+    fn span(&self, is_integer: bool) -> f32 {
         match self.options.method {
             Method::AverageDepthChange if is_integer => f32::INFINITY,
             Method::AverageDepthChange => 4096.0,

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::buffer::{Buffer, Number};
-use super::hidden::Hidden;
+use super::incomplete::Incomplete;
 use super::lanes::LANES;
 use super::run::Lane;
 use crate::Error;
@@ -150,18 +150,18 @@ pub(crate) unsafe fn sum_between<S: Simd, T: Lane>(ring: *const T, corners: &Cor
 pub(crate) struct Planes {
     data: Buffer<f32>,
     /// Of the points that were read.
-    pub hidden: Hidden,
+    pub incomplete: Incomplete,
 }
 
 impl Planes {
     /// Makes room for frames that are no larger.
     pub fn reserve(&mut self, frame: &Frame) -> Result<(), Error> {
         self.data.grow(frame.start_of(3, frame.ring))?;
-        self.hidden.reserve(frame)
+        self.incomplete.reserve(frame)
     }
 
     pub fn size(&self) -> usize {
-        self.data.size() + self.hidden.size()
+        self.data.size() + self.incomplete.size()
     }
 
     /// The ring, for groups here and there, each of which a slice would check.
@@ -207,14 +207,14 @@ impl Planes {
         unsafe {
             let (ys, zs) = (xs.add(frame.stride), xs.add(2 * frame.stride));
             let (near, far) = (S::splat(held[0]), S::splat(held[1]));
-            let mut hidden = S::splat(0.0);
+            let mut incomplete = S::splat(0.0);
             let mut largest = S::splat(0.0);
             for step in 0..frame.steps::<S>() {
                 let at = step * S::LANES;
                 let [x, y, z] = points_of_row.lanes::<S>(at);
                 let held_z = S::and(S::lt(near, S::abs(z)), S::lt(S::abs(z), far));
                 let is_held = S::and(held_z, S::and(S::finite(x), S::finite(y)));
-                hidden = S::or(hidden, S::and_not(is_held, held_z));
+                incomplete = S::or(incomplete, S::and_not(is_held, held_z));
                 let x = S::select(is_held, x, S::splat(filler[0]));
                 let y = S::select(is_held, y, S::splat(filler[1]));
                 let z = S::select(is_held, z, S::splat(filler[2]));
@@ -225,8 +225,8 @@ impl Planes {
             }
             let mut lanes = [0.0; LANES];
             S::store(lanes.as_mut_ptr(), largest);
-            if S::bits(hidden) != 0 {
-                self.hidden.note(points, frame, y, held);
+            if S::bits(incomplete) != 0 {
+                self.incomplete.note(points, frame, y, held);
             }
             lanes.into_iter().fold(0.0, f32::max)
         }

@@ -316,7 +316,7 @@ impl Tile<'_> {
         let mut run = Run::default();
         let (before, after) = window_reach(side);
         let mut next = frame.rows.start;
-        planes.hidden.start();
+        planes.incomplete.start();
         for y in self.rows.clone() {
             while next < (y + after + 1).min(self.image.height) {
                 // SAFETY: as the caller's.
@@ -332,10 +332,10 @@ impl Tile<'_> {
             }
             sums.aim(frame, y, side);
             let inner = self.inner(side, y);
-            let hidden = planes.hidden.aim(frame, y, before);
+            let incomplete = planes.incomplete.aim(frame, y, before);
             // SAFETY: as the caller's.
             unsafe {
-                self.row::<S, M>(frame, planes, sums, sink, &mut run, y, &inner, layer, hidden);
+                self.row::<S, M>(frame, planes, sums, sink, &mut run, y, &inner, layer, incomplete);
             }
         }
         Ok(())
@@ -399,7 +399,7 @@ impl Tile<'_> {
         y: usize,
         inner: &Range<usize>,
         layer: &Layer,
-        hidden: bool,
+        incomplete: bool,
     ) {
         let row = self.sides.row(y);
         for start in self.columns.clone().step_by(RUN) {
@@ -415,8 +415,8 @@ impl Tile<'_> {
                     }
                     let windows = pair.windows;
                     let mut plain = 0;
-                    if hidden {
-                        plain = planes.hidden.in_windows(frame, &pair);
+                    if incomplete {
+                        plain = planes.incomplete.in_windows(frame, &pair);
                         pair.windows &= !plain;
                     }
                     if windows == 0 {

@@ -241,7 +241,7 @@ pub(crate) fn find_depth_changes(
 }
 
 /// What CM finds along with even windows.
-pub(crate) struct Along<'a> {
+pub(crate) struct WithEven<'a> {
     /// The normals of the even windows, block by block.
     pub of_even: &'a Normals<'a>,
     /// In the paper's semantics those of the pixels that may take none; the others are not written.
@@ -263,7 +263,7 @@ pub(crate) fn even_windows(
     job: &Job,
     (cloud, asked): (&Cloud, &Asked),
     windows: &mut Vec<EvenWindow>,
-    along: Option<Along>,
+    along: Option<WithEven>,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
     for scratch in &scratch.each[..scratch.workers.count()] {

@@ -9,7 +9,7 @@ use crate::cloud::Points;
 
 /// Those of a tile's rows.
 #[derive(Debug, Default)]
-pub(crate) struct Hidden {
+pub(crate) struct Incomplete {
     /// By column of the frame: the row behind the last one that has such a point; 0 for none.
     behind: Buffer<u32>,
     /// Before each column, and behind the last: how many have one in the rows that windows of the row aimed at reach.
@@ -18,7 +18,7 @@ pub(crate) struct Hidden {
     end: usize,
 }
 
-impl Hidden {
+impl Incomplete {
     /// Makes room for frames that are no larger.
     pub fn reserve(&mut self, frame: &Frame) -> Result<(), Error> {
         self.behind.grow(frame.columns.len())?;
