@@ -433,7 +433,7 @@ impl Tile<'_> {
                 }
             }
             // SAFETY: as the caller's.
-            unsafe { self.finish::<S, M>(frame, planes, sums, row, sink, run, y) };
+            unsafe { self.finish::<S, M>(frame, planes, sums, sink, run, y) };
         }
     }
 
@@ -448,11 +448,11 @@ impl Tile<'_> {
         frame: &Frame,
         planes: &Planes,
         sums: &M,
-        row: &[f32],
         sink: &Sink,
         run: &mut Run<M>,
         y: usize,
     ) {
+        let row = self.sides.row(y);
         let planes_row = planes.rows(frame, y);
         let Run { sums: of_run, places, lanes, length } = run;
         // SAFETY: as the caller's; the rows are readable up to a whole pair of groups.
@@ -465,7 +465,7 @@ impl Tile<'_> {
                 let mut found = sums.estimate::<S::Pair>(of_run, at, sides, false);
                 let (mut doubtful, mut of_one_point) = (found.doubtful & lanes[number], 0);
                 if doubtful != 0 {
-                    of_one_point = self.of_one_point(frame, planes, row, (x, y), doubtful);
+                    of_one_point = self.of_one_point(frame, planes, (x, y), doubtful);
                     (windows, doubtful) = (windows & !of_one_point, doubtful & !of_one_point);
                 }
                 if doubtful != 0 {
@@ -497,7 +497,7 @@ impl Tile<'_> {
                     estimates.put(lane, Estimate { curvature, ..Estimate::NONE });
                 }
                 if plain != 0 {
-                    self.plain_lanes(&mut estimates, row, (x, y), plain);
+                    self.plain_lanes(&mut estimates, (x, y), plain);
                 }
                 self.write::<S>(sink, (x, y), written, &estimates);
             }
@@ -511,7 +511,6 @@ impl Tile<'_> {
         &self,
         frame: &Frame,
         planes: &Planes,
-        row: &[f32],
         (x, y): (usize, usize),
         lanes: u32,
     ) -> u32 {
@@ -528,7 +527,7 @@ impl Tile<'_> {
                 (0..3).flat_map(differ).fold(0, |any, bits| any | bits) == 0
             })
         };
-        let side = |lane: usize| row[x + lane] as usize;
+        let side = |lane: usize| self.sides.row(y)[x + lane] as usize;
         let (first, last) = (lanes.trailing_zeros(), u32::BITS - 1 - lanes.leading_zeros());
         let largest = Bits(lanes).map(side).max().unwrap_or(0);
         if are_alike(first as usize..=last as usize, largest) {
@@ -539,16 +538,10 @@ impl Tile<'_> {
 
     /// The normals of some lanes of those that begin with pixel `(x, y)`, by the plain form.
     #[cold]
-    fn plain_lanes(
-        &self,
-        estimates: &mut Estimates,
-        row: &[f32],
-        (x, y): (usize, usize),
-        lanes: u32,
-    ) {
+    fn plain_lanes(&self, estimates: &mut Estimates, (x, y): (usize, usize), lanes: u32) {
         for lane in Bits(lanes) {
             let pixel = (x + lane, y);
-            let side = row[pixel.0] as usize;
+            let side = self.sides.row(y)[pixel.0] as usize;
             let (points, image) = (self.points, self.image);
             let found = estimate_window(self.options.method, points, image, pixel, (side, side));
             let point = self.points.at(pixel.0, pixel.1);
