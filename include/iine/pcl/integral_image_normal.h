@@ -184,14 +184,9 @@ namespace iine
       void
       setNormalSmoothingSize (float normal_smoothing_size)
       {
-        if (!std::isfinite (normal_smoothing_size) || normal_smoothing_size <= 0)
-        {
-          PCL_ERROR ("[iine::%s::setNormalSmoothingSize] %f is not a finite number above 0; the size stays %f.\n",
-                     feature_name_.c_str (), static_cast<double> (normal_smoothing_size),
-                     static_cast<double> (options_.normal_smoothing_size));
-          return;
-        }
-        options_.normal_smoothing_size = normal_smoothing_size;
+        const int status = iine_estimator_set_normal_smoothing_size (handle_.get (), normal_smoothing_size);
+        if (isTaken ("setNormalSmoothingSize", status))
+          options_.normal_smoothing_size = normal_smoothing_size;
       }
 
       /** \brief Set the method.
