@@ -288,11 +288,8 @@ impl Estimator {
         } else {
             fast::paper::read_cloud(&job, cloud, scratch)?;
         }
-        // To PCL's windows, a point that misses a coordinate is missing whole.
-        let is_pcl = options.semantics == Semantics::Pcl;
-        let cleaned =
-            (!is_plain || is_pcl).then(|| packed(&cloud.points, cloud.width, cloud.height));
-        let points = cleaned.as_ref().unwrap_or(points);
+        // To all windows, a point that misses a coordinate is missing whole.
+        let points = &packed(&cloud.points, cloud.width, cloud.height);
         let whole_points = points.has_whole_points(normals);
         // But for zeros, which are left out now, this is as PCL.
         if !is_plain && !options.has_second_pass() {
@@ -312,7 +309,7 @@ impl Estimator {
             let estimate = |at: usize| chosen(at).unwrap_or_else(|| own(at));
             write(normals, indices, width, engine.scratch.workers(), |_, at| Some(estimate(at)));
         } else {
-            if is_pcl {
+            if options.semantics == Semantics::Pcl {
                 fast::compute(isa, points, options, indices, normals, scratch)?;
             } else if !is_along {
                 let choices = second_pass.choices();
