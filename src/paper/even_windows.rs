@@ -108,22 +108,17 @@ pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<
         }
         Some((radius, found))
     })?;
+    let (radius, points) = (radius as f32, plane.points as f32);
+    let side = 2.0 * radius + 1.0;
+    let per_bend = 1.0 / (side * side);
     Some(EvenWindow {
+        radius,
         q: plane.q.map(|q| q as f32),
         ray: plane.ray.map(|ray| ray as f32),
         steepness: plane.steepness_squared.sqrt() as f32,
         unevenness: plane.unevenness as f32,
         noise: noise(&plane) as f32,
-        ..EvenWindow::worth(radius, plane.points as f32)
+        per_noise: 12.0 / points * per_bend,
+        per_bend,
     })
-}
-
-impl EvenWindow {
-    /// A window of a radius with so many points.
-    pub fn worth(radius: u32, points: f32) -> Self {
-        let radius = radius as f32;
-        let side = 2.0 * radius + 1.0;
-        let per_bend = 1.0 / (side * side);
-        EvenWindow { radius, per_noise: 12.0 / points * per_bend, per_bend, ..Self::default() }
-    }
 }

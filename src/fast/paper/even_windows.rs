@@ -455,7 +455,7 @@ unsafe fn write<S: Groups>(
     let mut found = [EvenWindow::default(); GROUP];
     // SAFETY: as the caller's; a window is twelve floats.
     unsafe {
-        // As `EvenWindow::worth` has it.
+        // As `even_window` has it.
         let (one, points) = (Floats::splat(1.0), fits.points().narrow());
         let side = Floats::splat(2.0) * radii + one;
         let per_bend = one / (side * side);

@@ -42,8 +42,8 @@ pub(crate) struct Rings<const N: usize> {
     /// Row by row four planes: the points' fields.
     points: Buffer<f32>,
     columns: Range<usize>,
-    /// Elements from a row to the next.
-    stride: usize,
+    /// Elements from a row of sums to the next, and from a field of a row's points to the next.
+    pub stride: usize,
     /// Rows in the ring of sums, and in that of points.
     rows: usize,
     rows_of_points: usize,
@@ -210,12 +210,6 @@ impl<const N: usize> Rings<N> {
     #[inline(always)]
     pub fn points(&self) -> *const f32 {
         self.points.as_ptr()
-    }
-
-    /// From a field of a row's points to the next.
-    #[inline(always)]
-    pub fn plane_of_points(&self) -> usize {
-        self.stride
     }
 
     /// Where the point's fields start that is at this place of row `y`; all rows of windows are held.

@@ -309,11 +309,6 @@ impl Chunk {
     }
 }
 
-/// Which of the map's rows one of the chunks' own rows is.
-fn place_of(chunks: &[Chunk], y: usize) -> usize {
-    chunks[y / chunks[0].own.len()].place(y)
-}
-
 /// The rows shared out to `count` sweeps. A depth change more than `reach` away decides no window, so each sweep can
 /// start and end that far around its own rows.
 fn share_out(
@@ -485,7 +480,8 @@ impl Job<'_> {
         let [length, length_of_radii] = [width, width.div_ceil(step)].map(row_length);
         let Scratch { depths, radii, radii_of_blocks, chunks, .. } = scratch;
         let radii = if step == 1 {
-            &radii[place_of(chunks, y) * length..]
+            // All chunks but the last have as many own rows.
+            &radii[chunks[y / chunks[0].own.len()].place(y) * length..]
         } else {
             &radii_of_blocks[y / step * length_of_radii..]
         };

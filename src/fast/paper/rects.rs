@@ -164,7 +164,7 @@ impl<S: Groups> Rects<S> {
     /// As [`Rects::sums`].
     #[inline(always)]
     pub unsafe fn ends(&self, rings: &Rings<4>, line: usize) -> [Floats<S>; 3] {
-        let (points, plane) = (rings.points(), rings.plane_of_points());
+        let (points, plane) = (rings.points(), rings.stride);
         // SAFETY: as the caller's.
         unsafe {
             match *self {
