@@ -7,7 +7,8 @@ use crate::Error;
 use crate::cloud::Points;
 use crate::eigen::{Scatter, Symmetric3, eigen};
 use crate::methods::finite_point;
-use crate::paper::{ROUNDING, Rect, SummedArea};
+use crate::paper::{ROUNDING, SummedArea};
+use crate::rect::Rect;
 use crate::threads::Workers;
 
 /// Rows of a band at least: those that its windows reach around it are summed with it.

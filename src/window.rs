@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use crate::options::BorderPolicy;
-use crate::paper::Rect;
+use crate::rect::Rect;
 
 /// The image's size and what windows do at its border.
 #[derive(Clone, Debug)]

@@ -11,7 +11,7 @@ use super::run::OfRun;
 use super::tile::{Found, Pair, Sums, Tile};
 use crate::Error;
 use crate::memory::{bytes, make_room};
-use crate::paper::Rect;
+use crate::rect::Rect;
 use crate::simd::{Groups, Simd};
 use crate::window::Image;
 

@@ -11,8 +11,8 @@ use super::cloud::Cloud;
 use super::even_windows::{Asked, EvenWindow};
 use super::marks::Marks;
 use super::planes::{JITTER, inverse_depth};
-use super::rect::Rect;
 use crate::options::Options;
+use crate::rect::Rect;
 
 /// What the part of a window's variance that is not noise counts.
 pub(crate) const MISFIT: f32 = 3.0;

@@ -2,12 +2,12 @@
 
 use super::blocks::{BLOCK, Blocks};
 use super::planes::inverse_depth;
-use super::rect::Rect;
 use crate::Error;
 use crate::cloud::Points;
 use crate::memory::{bytes, resize};
 use crate::methods::is_finite;
 use crate::options::{Depth, Options, Semantics};
+use crate::rect::Rect;
 
 /// An organized cloud, row by row. A missing point has NaN coordinates and NaN depth.
 #[derive(Debug, Default)]

@@ -2,10 +2,10 @@
 
 use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::cloud::Cloud;
-use super::rect::Rect;
 use super::summed_area::SummedArea;
 use crate::Error;
 use crate::methods::cross;
+use crate::rect::Rect;
 use crate::threads::Workers;
 
 /// Integral images of normals, one for each block.

@@ -15,9 +15,9 @@ use super::blocks::Blocks;
 use super::cloud::Cloud;
 use super::marks::{Marks, WORD, around, columns, mark};
 use super::planes::{JITTER, Plane, inverse_depth};
-use super::rect::Rect;
 use crate::Error;
 use crate::memory::{bytes, refill, table};
+use crate::rect::Rect;
 use crate::threads::Workers;
 
 /// More than any window's radius. (Signed: of such numbers every processor takes the lesser eight at a time.)

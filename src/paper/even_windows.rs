@@ -8,7 +8,7 @@ use super::blocks::Blocks;
 use super::cloud::Cloud;
 use super::depth_change::Clean;
 use super::planes::Plane;
-use super::rect::Rect;
+use crate::rect::Rect;
 
 /// Inverse depths that deviate less than this many alpha from a plane are as good as in it.
 const EVEN: f32 = 0.02;

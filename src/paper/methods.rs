@@ -1,10 +1,10 @@
 //! Step 4: a normal from the points in a rectangle. Plain forms, walking over it; sums over finite points only.
 
 use super::cloud::CleanPoints;
-use super::rect::Rect;
 use crate::eigen::{Scatter, eigen};
 use crate::methods::{Estimate, normal_of_tangents};
 use crate::options::Method;
+use crate::rect::Rect;
 
 /// The estimate of a method of the paper; of SIMPLE_3D_GRADIENT, which it does not have, by the 3-D gradient.
 pub(crate) fn estimate(method: Method, cloud: &impl CleanPoints, rect: &Rect) -> Estimate {

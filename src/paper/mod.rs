@@ -14,7 +14,6 @@ mod even_windows;
 mod marks;
 mod methods;
 mod planes;
-mod rect;
 mod second_pass;
 pub(crate) mod smoothing_area;
 mod summed_area;
@@ -33,7 +32,6 @@ pub(crate) use even_windows::{
 pub(crate) use marks::{Marks, WORD, from as marks_from, mark, word_of};
 pub(crate) use methods::estimate as plain_estimate;
 pub(crate) use planes::{JITTER, Plane, inverse_depth};
-pub(crate) use rect::Rect;
 pub(crate) use second_pass::{Engine, SecondPass, Windows};
 pub(crate) use smoothing_area::window;
 pub(crate) use summed_area::{ROUNDING, SummedArea};
@@ -47,6 +45,7 @@ use crate::memory::table;
 use crate::methods::Estimate;
 use crate::options::{Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
+use crate::rect::Rect;
 use crate::threads::Workers;
 
 /// The maps of [`Semantics::Paper`], row by row.

@@ -6,8 +6,8 @@
 //! which are much the same in a window; and it is made from the moments that CM sums up (Eq. 16-25).
 
 use super::cloud::{CleanPoints, Cloud};
-use super::rect::Rect;
 use crate::eigen::{Scatter, Symmetric3};
+use crate::rect::Rect;
 
 /// The sensor's noise along rows and columns, in pixels: it moves points off steep planes by that many times the slope.
 pub(crate) const JITTER: f32 = 4.0;

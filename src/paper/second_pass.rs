@@ -10,7 +10,6 @@ use super::creases::SummedNormals;
 use super::depth_change::DepthChanges;
 use super::even_windows::{Asked, EvenWindow};
 use super::marks::{Marks, WORD, word_of};
-use super::rect::Rect;
 use super::{is_depth_change, of_radius, rect_around, smoothing_area, surroundings, window};
 use crate::Error;
 use crate::cloud::Points;
@@ -18,6 +17,7 @@ use crate::memory::{bytes, refill};
 use crate::methods::Estimate;
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
+use crate::rect::Rect;
 use crate::threads::Workers;
 
 /// How windows and their estimates are computed: by the plain forms, or fast. Estimates are normals, turned to the

@@ -1,7 +1,7 @@
 //! Step 3: the smoothing area map (the paper's B and R, Eq. 4, 5 and 8): the radius of every pixel's window.
 
-use super::rect::Rect;
 use crate::options::PaperOptions;
+use crate::rect::Rect;
 
 /// The smallest depth change at a depth: f_DC (Eq. 4).
 pub(crate) fn smallest_depth_change(depth: f32, options: &PaperOptions) -> f32 {

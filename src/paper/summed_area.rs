@@ -2,9 +2,9 @@
 
 use std::iter::repeat_n;
 
-use super::rect::Rect;
 use crate::Error;
 use crate::memory::{bytes, refill};
+use crate::rect::Rect;
 use crate::threads::Workers;
 
 /// What rounding on the path to a sum may gather, in units of the largest sum on it.

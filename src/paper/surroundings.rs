@@ -2,8 +2,8 @@
 
 use super::cloud::Cloud;
 use super::methods::plane_of;
-use super::rect::Rect;
 use crate::methods::Estimate;
+use crate::rect::Rect;
 
 /// How far around: fewer points are mostly noise.
 const REACH: usize = 3;

@@ -8,7 +8,8 @@ use crate::fast::moments::{Matrices, WindowMoments, sum_of_moments};
 use crate::fast::run::{Noted, OfRun};
 use crate::fast::tile::{Bits, Found};
 use crate::methods::Estimate;
-use crate::paper::{CleanPoints, ROUNDING, Rect};
+use crate::paper::{CleanPoints, ROUNDING};
+use crate::rect::Rect;
 use crate::simd::{GROUP, Groups, Simd};
 
 /// A method's sums and normals.

@@ -16,7 +16,8 @@ use crate::fast::tile::{Bits, Estimates, all};
 use crate::methods::Estimate;
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
-use crate::paper::{CleanPoints, Cleaned, Marks, Rect, marks_from, middle, plain_estimate, window};
+use crate::paper::{CleanPoints, Cleaned, Marks, marks_from, middle, plain_estimate, window};
+use crate::rect::Rect;
 use crate::simd::{Along, GROUP, Groups};
 
 /// A rectangle of the image whose normals are computed together.
