@@ -225,7 +225,7 @@ impl Channels<8> for Gradients {
 }
 
 impl Sums<8> for Gradients {
-    type OfRun = Tangents;
+    type OfRun = OfRun<f32, 6>;
 
     const EDGE: usize = 1;
     const ENDS: bool = false;
@@ -245,20 +245,20 @@ impl Sums<8> for Gradients {
         _: &Rects<S>,
         _: &Rings<8>,
         _: u32,
-        run: &mut Tangents,
+        run: &mut OfRun<f32, 6>,
         at: usize,
     ) {
         let [hx, hy, hz, _, vx, vy, vz, _] = *sums;
-        let horizontal = [hx.narrow(), hy.narrow(), hz.narrow()];
-        let vertical = [vx.narrow(), vy.narrow(), vz.narrow()];
+        let (hx, hy, hz) = (hx.narrow(), hy.narrow(), hz.narrow());
+        let (vx, vy, vz) = (vx.narrow(), vy.narrow(), vz.narrow());
         // SAFETY: as the caller's.
-        unsafe { run.note(horizontal, vertical, at) }
+        unsafe { run.store::<S>(at, [hx, hy, hz, vx, vy, vz]) }
     }
 
     #[inline(always)]
-    unsafe fn estimate<S: Simd>(run: &Tangents, at: usize, error: f64) -> Found<S> {
+    unsafe fn estimate<S: Simd>(run: &OfRun<f32, 6>, at: usize, error: f64) -> Found<S> {
         // SAFETY: as the caller's.
-        unsafe { run.across(at, error) }
+        unsafe { across(run, at, error) }
     }
 }
 
@@ -278,7 +278,7 @@ impl Channels<4> for SmoothedDepthChanges {
 }
 
 impl Sums<4> for SmoothedDepthChanges {
-    type OfRun = Tangents;
+    type OfRun = OfRun<f32, 6>;
 
     const EDGE: usize = 1;
     const ENDS: bool = true;
@@ -298,7 +298,7 @@ impl Sums<4> for SmoothedDepthChanges {
         rects: &Rects<S>,
         rings: &Rings<4>,
         lanes: u32,
-        run: &mut Tangents,
+        run: &mut OfRun<f32, 6>,
         at: usize,
     ) {
         let [h, h_count, v, v_count] = *sums;
@@ -309,16 +309,16 @@ impl Sums<4> for SmoothedDepthChanges {
             // Times twice the number of depth changes, which are over two pixels each.
             let (h_count, v_count) = (h_count.narrow(), v_count.narrow());
             let (h_count, v_count) = (h_count + h_count, v_count + v_count);
-            let horizontal = [hx * h_count, hy * h_count, h.narrow() * h_span];
-            let vertical = [vx * v_count, vy * v_count, v.narrow() * v_span];
-            run.note(horizontal, vertical, at);
+            let (hx, hy, hz) = (hx * h_count, hy * h_count, h.narrow() * h_span);
+            let (vx, vy, vz) = (vx * v_count, vy * v_count, v.narrow() * v_span);
+            run.store::<S>(at, [hx, hy, hz, vx, vy, vz]);
         }
     }
 
     #[inline(always)]
-    unsafe fn estimate<S: Simd>(run: &Tangents, at: usize, error: f64) -> Found<S> {
+    unsafe fn estimate<S: Simd>(run: &OfRun<f32, 6>, at: usize, error: f64) -> Found<S> {
         // SAFETY: as the caller's.
-        unsafe { run.across(at, error) }
+        unsafe { across(run, at, error) }
     }
 }
 
@@ -368,49 +368,30 @@ const DOUBT_SINE: f32 = 1e-4;
 /// And where their squares come near the smallest floats.
 const DOUBT_TINY: f32 = 1e-30;
 
-/// Horizontal and vertical tangents of a run's pixels; NaN where there is none, and certainly no normal.
-#[derive(Default)]
-pub(crate) struct Tangents([OfRun<f32, 3>; 2]);
-
-impl Noted for Tangents {}
-
-impl Tangents {
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    unsafe fn note<S: Simd>(&mut self, h: [Floats<S>; 3], v: [Floats<S>; 3], at: usize) {
-        let Tangents([horizontal, vertical]) = self;
-        // SAFETY: as the caller's.
-        unsafe {
-            horizontal.store::<S>(at, h);
-            vertical.store::<S>(at, v);
+/// The directions across the horizontal and vertical tangents of a run's pixels from `at` on, which are NaN where there is
+/// none, and certainly no normal. `error` is what those of the sums stay below.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn across<S: Simd>(run: &OfRun<f32, 6>, at: usize, error: f64) -> Found<S> {
+    // SAFETY: as the caller's.
+    unsafe {
+        let [hx, hy, hz, vx, vy, vz] = run.load::<S>(at);
+        let (h, v) = ([hx, hy, hz], [vx, vy, vz]);
+        let n = cross(v, h);
+        let (n2, h2, v2) = (dot(n, n), dot(h, h), dot(v, v));
+        let error = (error * DOUBT_SUMS) as f32;
+        let rounding = Floats::splat(2.0 * error * error) * (h2 + v2);
+        let sine = h2 * v2 * Floats::splat(DOUBT_SINE);
+        let scale = Floats::splat(1.0) / n2.sqrt();
+        let sure = rounding.max(sine).max(Floats::splat(DOUBT_TINY)).lt(n2);
+        let both = S::and(S::eq(h[0].0, h[0].0), S::eq(v[0].0, v[0].0));
+        let none = Floats::splat(f32::NAN);
+        let mut normal = [none; 3];
+        for c in 0..3 {
+            normal[c].take(both, n[c] * scale);
         }
-    }
-
-    /// The directions across them. `error` is what those of the sums stay below.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    unsafe fn across<S: Simd>(&self, at: usize, error: f64) -> Found<S> {
-        let Tangents([horizontal, vertical]) = self;
-        // SAFETY: as the caller's.
-        unsafe {
-            let (h, v) = (horizontal.load::<S>(at), vertical.load::<S>(at));
-            let n = cross(v, h);
-            let (n2, h2, v2) = (dot(n, n), dot(h, h), dot(v, v));
-            let error = (error * DOUBT_SUMS) as f32;
-            let rounding = Floats::splat(2.0 * error * error) * (h2 + v2);
-            let sine = h2 * v2 * Floats::splat(DOUBT_SINE);
-            let scale = Floats::splat(1.0) / n2.sqrt();
-            let sure = rounding.max(sine).max(Floats::splat(DOUBT_TINY)).lt(n2);
-            let both = S::and(S::eq(h[0].0, h[0].0), S::eq(v[0].0, v[0].0));
-            let none = Floats::splat(f32::NAN);
-            let mut normal = [none; 3];
-            for c in 0..3 {
-                normal[c].take(both, n[c] * scale);
-            }
-            Found { normal, curvature: none, doubtful: S::bits(both) & !sure }
-        }
+        Found { normal, curvature: none, doubtful: S::bits(both) & !sure }
     }
 }
