@@ -37,11 +37,11 @@ pub(super) struct Even<'a> {
 }
 
 /// A rectangle of the image whose blocks' even windows are found together, and the normals of the pixels that may take none.
-pub(super) struct EvenTile<'a, F> {
+pub(super) struct EvenTile<'a> {
     pub even: &'a Even<'a>,
-    pub tile: Tile<'a, F>,
+    pub tile: Tile<'a>,
     /// The same, of blocks.
-    pub blocks: Tile<'a, F>,
+    pub blocks: Tile<'a>,
     /// For the pixels' normals, if they are asked for.
     pub sink: Option<&'a Sink<'a>>,
 }
@@ -130,7 +130,7 @@ impl<S: Groups> Fits<S> {
     }
 }
 
-impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> EvenTile<'a, F> {
+impl EvenTile<'_> {
     /// The windows of the blocks whose points a layer holds, of those that wait for it, and the normals that are asked for,
     /// as [`Tile::compute`].
     ///

@@ -504,7 +504,7 @@ impl Job<'_> {
         let super::Scratch { workers, each, listed, paper, .. } = scratch;
         let (width, height) = (points.width(), points.height());
         let sink = Sink::new(normals, indices, width, listed)?;
-        let row = |y: usize| self.row(paper, step, y);
+        let row = &|y: usize| self.row(paper, step, y);
         let grid = Grid::new(width, height, largest, column(options.method));
         let limit = options.paper.largest_radius;
         let room = grid.room(limit, elements_of_rings);
@@ -531,9 +531,9 @@ impl Job<'_> {
                 // SAFETY: the processor has the instruction set, and tiles do not share pixels.
                 unsafe {
                     if layer.is_partial() {
-                        paths::run(self.isa, TileTask::<_, true> { tile, layer, scratch, sink })
+                        paths::run(self.isa, TileTask::<true> { tile, layer, scratch, sink })
                     } else {
-                        paths::run(self.isa, TileTask::<_, false> { tile, layer, scratch, sink })
+                        paths::run(self.isa, TileTask::<false> { tile, layer, scratch, sink })
                     }
                 }
             });
@@ -557,7 +557,7 @@ impl Job<'_> {
         let (width, height) = (points.width(), points.height());
         let sink = own.map(|own| Sink::new(own.normals, own.indices, width, listed)).transpose()?;
         let length = row_length(width);
-        let row = |y: usize| match sink {
+        let row = &|y: usize| match sink {
             Some(_) => self.row(paper, 1, y),
             None => (&paper.depths[y * length..][..length], &[][..]),
         };
@@ -588,8 +588,8 @@ impl Job<'_> {
 
 /// Has a tile computed layer by layer, of which `compute` returns how deep the nearest point is that pixels wait for.
 /// `ranges` has the rows' depths, of which the farthest in a layer is `span` times as deep as the nearest.
-fn each_layer<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])>(
-    tile: &Tile<'a, F>,
+fn each_layer(
+    tile: &Tile,
     ranges: &[[f32; 2]],
     span: f32,
     mut compute: impl FnMut(&Layer) -> Option<f32>,
@@ -681,17 +681,14 @@ impl Task for SweepTask<'_> {
 
 /// A layer of one tile; no one else writes its pixels. Gives how deep the nearest point is that pixels wait for. `PARTIAL`
 /// tells whether the layer is one of several: apart, as it would cost other tiles some percents.
-struct TileTask<'a, 't, F, const PARTIAL: bool> {
-    tile: &'t Tile<'a, F>,
+struct TileTask<'a, 't, const PARTIAL: bool> {
+    tile: &'t Tile<'a>,
     layer: &'t Layer,
     scratch: &'t mut WorkerScratch,
     sink: &'t Sink<'t>,
 }
 
-impl<'a, F, const PARTIAL: bool> Task for TileTask<'a, '_, F, PARTIAL>
-where
-    F: Fn(usize) -> (&'a [f32], &'a [f32]),
-{
+impl<const PARTIAL: bool> Task for TileTask<'_, '_, PARTIAL> {
     type Output = Option<f32>;
 
     #[inline(always)]
@@ -719,17 +716,14 @@ where
 }
 
 /// A layer of the even windows of one tile, as [`TileTask`].
-struct EvenTask<'a, 't, F> {
-    tile: &'t EvenTile<'a, F>,
+struct EvenTask<'a, 't> {
+    tile: &'t EvenTile<'a>,
     layer: &'t Layer,
     rings: &'t mut Rings<MOMENTS>,
     waiting: &'t mut Waiting,
 }
 
-impl<'a, F> Task for EvenTask<'a, '_, F>
-where
-    F: Fn(usize) -> (&'a [f32], &'a [f32]),
-{
+impl Task for EvenTask<'_, '_> {
     type Output = Option<f32>;
 
     #[inline(always)]

@@ -22,7 +22,7 @@ use crate::simd::{Along, GROUP, Groups};
 
 /// A rectangle of the image whose normals are computed together.
 #[derive(Clone)]
-pub(crate) struct Tile<'a, F> {
+pub(crate) struct Tile<'a> {
     pub points: &'a Points<'a>,
     pub options: &'a Options,
     pub columns: Range<usize>,
@@ -33,12 +33,12 @@ pub(crate) struct Tile<'a, F> {
     /// Columns and rows of the blocks whose middle pixels get the normals, at most `BLOCK`; the tile starts with one.
     pub step: usize,
     /// A row's depths, and the radii of its windows, if it has normals: 0 for none. Both can be read up to a whole group.
-    pub row: F,
+    pub row: &'a (dyn Fn(usize) -> (&'a [f32], &'a [f32]) + Sync),
     /// Pixels that are not written.
     pub left_out: Option<&'a Marks>,
 }
 
-impl<'a, F: Fn(usize) -> (&'a [f32], &'a [f32])> Tile<'a, F> {
+impl Tile<'_> {
     /// The normals of the pixels whose windows a layer holds, of those that wait for it. Returns how deep the nearest point
     /// is that others wait for, if there are some.
     ///
