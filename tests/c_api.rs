@@ -1,5 +1,5 @@
 //! The C API as its users have it: `tests/c_api.c`, compiled as C99 and as C++ with every warning an error, linked
-//! with the shared and with the static library, run as a program.
+//! with the shared and with the static library, run as a program; and `tests/c_threads.c`, which loads the shared one.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -22,12 +22,12 @@ fn compiler() -> cc::Tool {
 }
 
 /// Runs a program built for this test's platform, through cargo's runner if there is one.
-fn run(program: &Path, library_dir: &Path) {
+fn run(program: &Path, arguments: &[PathBuf], library_dir: &Path) {
     let runner = format!("CARGO_TARGET_{}_UNKNOWN_LINUX_GNU_RUNNER", std::env::consts::ARCH);
     let runner = std::env::var(runner.to_uppercase()).unwrap_or_default();
     let mut words = runner.split_whitespace().map(PathBuf::from).chain([program.to_owned()]);
     let mut command = Command::new(words.next().expect("at least the program"));
-    check(command.args(words).env("LD_LIBRARY_PATH", library_dir));
+    check(command.args(words).args(arguments).env("LD_LIBRARY_PATH", library_dir));
 }
 
 fn check(command: &mut Command) {
@@ -43,23 +43,39 @@ fn check(command: &mut Command) {
     );
 }
 
-/// Compiles the program as `language`, links it as `link` says, and runs it.
-fn compile_and_run(name: &str, language: &[&str], link: impl FnOnce(&mut Command, &Path)) {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+/// A program's directory.
+fn directory(name: &str) -> PathBuf {
     let directory = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     std::fs::create_dir_all(&directory).expect("a directory for the program");
-    let program = directory.join("c_api");
+    directory
+}
+
+/// Compiles one of the tests' programs as `language`, links it as `link` says, and gives its path.
+fn compile(
+    source: &str,
+    directory: &Path,
+    language: &[&str],
+    link: impl FnOnce(&mut Command, &Path),
+) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let program = directory.join("program");
     let mut command = compiler().to_command();
     command
         .args(language)
         .args(["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-I"])
         .arg(root.join("include"))
-        .arg(root.join("tests/c_api.c"))
+        .arg(root.join("tests").join(source))
         .args(["-x", "none", "-o"])
         .arg(&program);
-    link(&mut command, &directory);
+    link(&mut command, directory);
     check(&mut command);
-    run(&program, &directory);
+    program
+}
+
+/// Compiles `tests/c_api.c` as `language`, links it as `link` says, and runs it.
+fn compile_and_run(name: &str, language: &[&str], link: impl FnOnce(&mut Command, &Path)) {
+    let directory = directory(name);
+    run(&compile("c_api.c", &directory, language, link), &[], &directory);
 }
 
 /// Links the shared library under the name that its SONAME asks the loader for.
@@ -89,4 +105,13 @@ fn c99_with_the_static_library() {
 #[test]
 fn cpp_with_the_shared_library() {
     compile_and_run("cpp-shared", &CPP, shared);
+}
+
+#[test]
+fn threads_where_the_library_is_unloaded_or_the_process_forked() {
+    let directory = directory("threads");
+    let program = compile("c_threads.c", &directory, &C99, |command, _| {
+        command.args(["-ldl", "-lpthread"]);
+    });
+    run(&program, &[library("libiine.so")], &directory);
 }
