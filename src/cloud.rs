@@ -170,8 +170,8 @@ impl<'a> Points<'a> {
         unsafe { Self::from_grid([x.as_ptr(), y.as_ptr(), z.as_ptr()], grid) }
     }
 
-    /// A view from the addresses of the first pixel's x, y and z. Strides are in bytes, multiples of 4;
-    /// `row_stride` 0 means packed rows.
+    /// A view from the addresses of the first pixel's x, y and z. Strides, from a point and from a row to the next, are in
+    /// bytes, multiples of 4; a `row_stride` of 0 means packed rows.
     ///
     /// Errors: [`Error::NullPointer`], [`Error::Misaligned`], [`Error::Size`], [`Error::Stride`].
     ///
