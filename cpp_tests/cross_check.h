@@ -30,6 +30,9 @@ namespace cross_check
   constexpr double EDGE_ON = 1e-6;             ///< cosine below which f32 does not decide which side is seen
   constexpr int REFERENCE_STEP = 7;            ///< COVARIANCE_MATRIX: the reference for every 7th normal
 
+  constexpr const char *METHODS[] = {"COVARIANCE_MATRIX", "AVERAGE_3D_GRADIENT", "AVERAGE_DEPTH_CHANGE",
+                                     "SIMPLE_3D_GRADIENT"};
+
   /** \brief One configuration of either class. */
   struct Config
   {
@@ -43,8 +46,6 @@ namespace cross_check
     std::string
     name () const
     {
-      static const char *const METHODS[] = {"COVARIANCE_MATRIX", "AVERAGE_3D_GRADIENT", "AVERAGE_DEPTH_CHANGE",
-                                            "SIMPLE_3D_GRADIENT"};
       char text[120];
       std::snprintf (text, sizeof (text), "%-20s %-6s %-5s %3g %.2f %-7s", METHODS[method],
                      mirror ? "MIRROR" : "IGNORE", depth_dependent ? "depth" : "fixed", size, factor,
@@ -443,7 +444,8 @@ namespace cross_check
     }
   }
 
-  /** \brief The report: a file if IINE_REPORT names a directory, and a summary per method printed at the end. */
+  /** \brief The report: a file in the directory that IINE_REPORT names, else in the current one, and a summary per
+    * method printed at the end. */
   class Report
   {
     public:
@@ -472,8 +474,6 @@ namespace cross_check
           std::fclose (file_);
         std::printf ("%-30s %10s %10s %6s %8s %7s %7s %7s %8s %8s | worst p99.9 and max of ours to PCL's (deg)\n",
                      name_.c_str (), "compared", "normals", "mask", "undef", "line", "f32", "judged", "worse", "off1");
-        static const char *const METHODS[] = {"COVARIANCE_MATRIX", "AVERAGE_3D_GRADIENT", "AVERAGE_DEPTH_CHANGE",
-                                              "SIMPLE_3D_GRADIENT"};
         for (int method = 0; method < 4; ++method)
         {
           const Sum &s = sums_[method];

@@ -6,10 +6,6 @@
 
 #include "cross_check.h"
 
-#ifndef IINE_DEFAULT_TEST_DATA
-#define IINE_DEFAULT_TEST_DATA "../shared/data"
-#endif
-
 namespace
 {
   template <typename PointT> void
