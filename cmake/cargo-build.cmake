@@ -12,6 +12,23 @@ else()
   unset(ENV{CARGO_BUILD_TARGET})
 endif()
 
+# Panics name source files: those of other crates and of Rust's library not by where this machine has them. The user's
+# flags stay: this is added to them where cargo reads them, and not at all if it would be split at a space.
+set(flags CARGO_BUILD_RUSTFLAGS)
+if(DEFINED ENV{RUSTFLAGS})
+  set(flags RUSTFLAGS)
+endif()
+foreach(name cargo rustup)
+  string(TOUPPER ${name}_HOME variable)
+  set(home $ENV{HOME}/.${name})
+  if(DEFINED ENV{${variable}})
+    set(home $ENV{${variable}})
+  endif()
+  if(NOT home MATCHES " ")
+    set(ENV{${flags}} "$ENV{${flags}} --remap-path-prefix=${home}=/${name}")
+  endif()
+endforeach()
+
 execute_process(COMMAND ${CARGO} ${arguments} RESULT_VARIABLE result)
 if(NOT result EQUAL 0)
   message(FATAL_ERROR "cargo build failed")
