@@ -68,7 +68,7 @@ impl Error {
             Error::Overlap => c"output bytes overlap input bytes or other output bytes",
             Error::OptionValue => c"an option's value is outside its range",
             Error::Unsupported => {
-                c"the method does not support this border policy, these semantics or this map"
+                c"the method or the semantics do not go with this border policy or this map"
             }
             Error::Index => c"an index is outside the cloud",
             Error::OutOfMemory => c"out of memory",

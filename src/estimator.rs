@@ -112,10 +112,10 @@ impl Estimator {
         indices: &[i32],
         normals: &mut Normals,
     ) -> Result<(), Error> {
-        self.options.check()?;
         if indices.is_empty() {
             return Ok(());
         }
+        self.options.check()?;
         if (normals.width(), normals.height()) != (indices.len(), 1) {
             return Err(Error::Size);
         }
@@ -160,8 +160,8 @@ impl Estimator {
     ///
     /// The window starts at `(x - width / 2, y - height / 2)`; what lies outside the image is clipped, or folded
     /// back with [`BorderPolicy::Mirror`](crate::BorderPolicy::Mirror), which
-    /// [`Semantics::Paper`](crate::Semantics::Paper) does not have. NaN if it gives no normal; not turned to
-    /// the viewpoint if the pixel's point is missing. Takes time proportional to the window, or with
+    /// [`Semantics::Paper`](crate::Semantics::Paper) does not have. NaN if it gives no normal. If the
+    /// pixel's point is not finite, the normal may point to either side. Takes time proportional to the window, or with
     /// `zero_is_missing` in PCL's semantics to the cloud.
     /// Errors: as [`Estimator::compute`] but for threads, and [`Error::Index`] if the pixel is outside the cloud.
     pub fn compute_window(

@@ -36,7 +36,7 @@ impl Method {
 #[non_exhaustive]
 #[repr(i32)]
 pub enum BorderPolicy {
-    /// The outer `normal_smoothing_size` rows and columns (rounded down) get no normal, but with one-sided windows.
+    /// The outer `normal_smoothing_size` rows and columns (rounded down) get no normal unless `one_sided_windows` are on.
     #[default]
     Ignore = 0,
     /// Windows are folded back at the border.
@@ -175,7 +175,7 @@ pub struct Options {
     pub method: Method,
     /// The border policy; default [`BorderPolicy::Ignore`].
     pub border_policy: BorderPolicy,
-    /// Side of the window in pixels; finite, above 0, default 10. The window is
+    /// Side of the largest window in pixels; finite, above 0, default 10. The side of a pixel's window is
     /// `min(distance to the nearest depth change, normal_smoothing_size)` rounded down, and pixels where that
     /// minimum is not above 2 get no normal.
     pub normal_smoothing_size: f32,
@@ -186,7 +186,7 @@ pub struct Options {
     pub max_depth_change_factor: f32,
     /// The point the normals are turned towards, in the cloud's coordinates; default the origin.
     pub viewpoint: [f32; 3],
-    /// Worker threads: 1 (the default) computes on the calling thread, 0 takes one per core; at most 1024.
+    /// Worker threads: 1 (the default) computes on the calling thread, 0 takes one per processor; at most 1024.
     /// The result does not depend on it, bit for bit.
     pub threads: usize,
     /// Whose windows and sums; default [`Semantics::Pcl`].

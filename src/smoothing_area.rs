@@ -2,7 +2,7 @@
 
 use crate::options::Options;
 
-/// The least value of the smoothing area that gives a window; PCL asks for more than this.
+/// A pixel has a window if its smoothing area is above this, as in PCL.
 pub(crate) const SMALLEST: f32 = 2.0;
 
 /// The largest side a window can have: every whole number up to it is a float.

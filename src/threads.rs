@@ -19,7 +19,7 @@ pub(crate) struct Workers {
 }
 
 impl Workers {
-    /// Makes `threads` workers ready; 0 takes one per core.
+    /// Makes `threads` workers ready; 0 takes one per processor.
     pub fn prepare(&mut self, threads: usize) -> Result<(), Error> {
         let threads = match threads {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
@@ -65,7 +65,8 @@ impl Workers {
         1 + self.pool.as_ref().map_or(0, ThreadPool::current_num_threads)
     }
 
-    /// Calls `work(worker, parts)` once on every thread, with the parts that fall to it, as it asks for them.
+    /// Calls `work(worker, parts)` as often as there are threads, mostly once on each; each call gets the parts that fall to
+    /// it, as it asks for them.
     pub fn share<T: Send>(
         &self,
         parts: impl Iterator<Item = T> + Send,

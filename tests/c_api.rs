@@ -1,5 +1,5 @@
-//! The C API as its users have it: `tests/c_api.c`, compiled as C99 and as C++ with every warning an error, linked
-//! with the shared and with the static library, run as a program; and `tests/c_threads.c`, which loads the shared one.
+//! The C API as its users have it: `tests/c_api.c`, compiled with every warning an error, as C99 with the shared and with
+//! the static library and as C++ with the shared one, and run; and `tests/c_threads.c`, which loads the shared one.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

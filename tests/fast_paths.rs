@@ -18,9 +18,9 @@ struct Worst {
     computations: usize,
 }
 
-/// Degrees that a normal may differ from the plain form's: in AVERAGE_3D_GRADIENT and SIMPLE_3D_GRADIENT by the
-/// rounding to integers (`gradients.rs` asks the plain form where the worst case would be 1.5e-4), in
-/// AVERAGE_DEPTH_CHANGE by either (likewise), in COVARIANCE_MATRIX and the paper's methods by a hundredth of that.
+/// Degrees that a normal may differ from the plain form's. In PCL's AVERAGE_3D_GRADIENT and SIMPLE_3D_GRADIENT it is the
+/// rounding to integers (`gradients.rs` doubts normals that it could turn by more than 1.5e-4 radians, 0.009 degrees), and so
+/// in AVERAGE_DEPTH_CHANGE where that sums integers. COVARIANCE_MATRIX and the paper's methods sum in doubles.
 fn allowed(options: &Options) -> f64 {
     match options.method {
         Method::CovarianceMatrix => 1e-3,
@@ -474,7 +474,7 @@ fn windows_as_large_as_the_image_equal_the_plain_form() {
     println!("{worst:?}");
 }
 
-/// And cost no more than others: by walking over them this would take hours.
+/// Windows as large as the image cost no more than others: by walking over them this would take hours.
 #[test]
 fn windows_as_large_as_the_image_are_summed() {
     let cloud = Cloud::new(Kind::Plane, 640, 480, 0);

@@ -131,7 +131,7 @@ fn nothing_panics() {
     assert_eq!(differing, 0);
 }
 
-/// The options that PCL does not have; without any of them about every 20th time.
+/// The options that PCL does not have; PCL's semantics without any of the switches about every 16th time.
 fn random_options_beyond_pcl(random: &mut Random) -> Options {
     let mut options = random_options(random);
     if options.normal_smoothing_size > 64.0 {

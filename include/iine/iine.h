@@ -2,9 +2,9 @@
  * iine: normals of organized point clouds by integral images.
  *
  * Functions return a status: IINE_OK (0), or one of IINE_ERROR_*, and then have written nothing (but see
- * IINE_ERROR_OUT_OF_MEMORY); iine_status_string() has the text. Nothing here prints, exits or throws, unless the
- * memory for starting threads is missing; with IINE_ERROR_INTERNAL alone, a defect of this library, stderr says what
- * went wrong.
+ * IINE_ERROR_OUT_OF_MEMORY); iine_status_string() has the text. Nothing here prints, exits or throws, with two
+ * exceptions: with IINE_ERROR_INTERNAL, a defect of this library, stderr says what went wrong; and where memory for
+ * starting threads is missing, the process may be aborted.
  */
 
 #ifndef IINE_IINE_H
@@ -105,8 +105,8 @@
 #define IINE_METHOD_SIMPLE_3D_GRADIENT 3
 
 /**
- * The outer rows and columns, as many as the smoothing size rounded down, get no normal (the default), but with
- * one-sided windows.
+ * The default: the outer rows and columns, as many as the smoothing size rounded down, get no normal unless one-sided
+ * windows are on.
  */
 #define IINE_BORDER_POLICY_IGNORE 0
 
@@ -372,12 +372,12 @@ int32_t iine_estimator_compute_indices(struct iine_estimator *estimator,
  * (as PCL's `computePointNormal` after `setRectSize`).
  *
  * The window starts at (x - rect_width / 2, y - rect_height / 2). What lies outside the image is left out with
- * IINE_BORDER_POLICY_IGNORE and folded back with IINE_BORDER_POLICY_MIRROR. Where the window gives no normal, and
- * a size of 0 never does, NaN is written; where the pixel's point is missing, a normal that is not turned to the
- * viewpoint. The border policy has no effect with IINE_SEMANTICS_PAPER. Takes time proportional to the window's
- * area, but to the cloud's with missing zeros in PCL's semantics.
+ * IINE_BORDER_POLICY_IGNORE and folded back with IINE_BORDER_POLICY_MIRROR. NaN is written where the window gives no
+ * normal, as one of size 0 never does. Where the pixel's point is not finite, the normal may point to either side. The
+ * border policy has no effect with IINE_SEMANTICS_PAPER. Takes time proportional to the window's area, or, with missing
+ * zeros in PCL's semantics, to the cloud's.
  *
- * Errors: as `iine_estimator_compute`, IINE_ERROR_INDEX if the pixel is outside the cloud, and
+ * Errors: as `iine_estimator_compute` but for IINE_ERROR_THREADS, IINE_ERROR_INDEX if the pixel is outside the cloud, and
  * IINE_ERROR_OPTION_VALUE if a size is negative. Nothing is written then.
  *
  * # Safety
@@ -452,7 +452,8 @@ int32_t iine_estimator_set_method(struct iine_estimator *estimator, int32_t meth
 int32_t iine_estimator_set_border_policy(struct iine_estimator *estimator, int32_t border_policy);
 
 /**
- * Sets the smoothing size in pixels, the side of the largest window: finite, above 0; default 10.
+ * Sets the smoothing size in pixels, the side of the largest window without depth-dependent smoothing: finite, above 0;
+ * default 10.
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
  *
@@ -497,10 +498,10 @@ int32_t iine_estimator_set_max_depth_change_factor(struct iine_estimator *estima
 int32_t iine_estimator_set_viewpoint(struct iine_estimator *estimator, float x, float y, float z);
 
 /**
- * Sets the number of threads: 1 (the default) computes on the calling thread, 0 takes one per core. The result
+ * Sets the number of threads: 1 (the default) computes on the calling thread, 0 takes one per processor. The result
  * does not depend on it, bit for bit. They are started by the next computation, and live until another number is asked
- * for; in a fork of the process, by the next computation there. Where memory for starting them is missing, the process
- * may be aborted.
+ * for, the scratch memory is released or the estimator is freed; a fork of the process starts its own with its next
+ * computation. Where memory for starting them is missing, the process may be aborted.
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE above 1024.
  *

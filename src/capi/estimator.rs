@@ -152,12 +152,12 @@ pub unsafe extern "C" fn iine_estimator_compute_indices(
 /// (as PCL's `computePointNormal` after `setRectSize`).
 ///
 /// The window starts at (x - rect_width / 2, y - rect_height / 2). What lies outside the image is left out with
-/// IINE_BORDER_POLICY_IGNORE and folded back with IINE_BORDER_POLICY_MIRROR. Where the window gives no normal, and
-/// a size of 0 never does, NaN is written; where the pixel's point is missing, a normal that is not turned to the
-/// viewpoint. The border policy has no effect with IINE_SEMANTICS_PAPER. Takes time proportional to the window's
-/// area, but to the cloud's with missing zeros in PCL's semantics.
+/// IINE_BORDER_POLICY_IGNORE and folded back with IINE_BORDER_POLICY_MIRROR. NaN is written where the window gives no
+/// normal, as one of size 0 never does. Where the pixel's point is not finite, the normal may point to either side. The
+/// border policy has no effect with IINE_SEMANTICS_PAPER. Takes time proportional to the window's area, or, with missing
+/// zeros in PCL's semantics, to the cloud's.
 ///
-/// Errors: as `iine_estimator_compute`, IINE_ERROR_INDEX if the pixel is outside the cloud, and
+/// Errors: as `iine_estimator_compute` but for IINE_ERROR_THREADS, IINE_ERROR_INDEX if the pixel is outside the cloud, and
 /// IINE_ERROR_OPTION_VALUE if a size is negative. Nothing is written then.
 ///
 /// # Safety

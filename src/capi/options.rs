@@ -85,7 +85,8 @@ pub unsafe extern "C" fn iine_estimator_set_border_policy(
     unsafe { set(estimator, change) }
 }
 
-/// Sets the smoothing size in pixels, the side of the largest window: finite, above 0; default 10.
+/// Sets the smoothing size in pixels, the side of the largest window without depth-dependent smoothing: finite, above 0;
+/// default 10.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
 ///
@@ -168,10 +169,10 @@ pub unsafe extern "C" fn iine_estimator_set_viewpoint(
     unsafe { set(estimator, change) }
 }
 
-/// Sets the number of threads: 1 (the default) computes on the calling thread, 0 takes one per core. The result
+/// Sets the number of threads: 1 (the default) computes on the calling thread, 0 takes one per processor. The result
 /// does not depend on it, bit for bit. They are started by the next computation, and live until another number is asked
-/// for; in a fork of the process, by the next computation there. Where memory for starting them is missing, the process
-/// may be aborted.
+/// for, the scratch memory is released or the estimator is freed; a fork of the process starts its own with its next
+/// computation. Where memory for starting them is missing, the process may be aborted.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE above 1024.
 ///

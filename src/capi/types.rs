@@ -30,8 +30,8 @@ pub const IINE_METHOD_AVERAGE_DEPTH_CHANGE: i32 = 2;
 /// IINE_SEMANTICS_PAPER.
 pub const IINE_METHOD_SIMPLE_3D_GRADIENT: i32 = 3;
 
-/// The outer rows and columns, as many as the smoothing size rounded down, get no normal (the default), but with
-/// one-sided windows.
+/// The default: the outer rows and columns, as many as the smoothing size rounded down, get no normal unless one-sided
+/// windows are on.
 pub const IINE_BORDER_POLICY_IGNORE: i32 = 0;
 /// Windows are folded back at the border of the image.
 pub const IINE_BORDER_POLICY_MIRROR: i32 = 1;

@@ -1,8 +1,9 @@
 //! The paper's own windows and methods, and what its conclusion leaves open: windows that end at depth changes and
 //! at creases, both also on top of PCL's windows.
 //!
-//! One file per step, in its plain form. What the steps share is that a pixel's window is a rectangle inside the
-//! image, and that a method turns the points in a rectangle into a normal.
+//! The steps, in their plain forms, are `depth_change`, `distance`, `smoothing_area` and `methods`. The second pass is
+//! `second_pass`, with `creases`, `even_windows`, `choices` and `surroundings`. What the steps share is that a
+//! pixel's window is a rectangle inside the image, and that a method turns the points in a rectangle into a normal.
 
 mod blocks;
 mod choices;

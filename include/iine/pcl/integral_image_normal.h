@@ -177,7 +177,7 @@ namespace iine
         options_.max_depth_change_factor = max_depth_change_factor;
       }
 
-      /** \brief Set the side of the largest window.
+      /** \brief Set the side of the largest window without depth-dependent smoothing.
         * \param[in] normal_smoothing_size the side in pixels, finite and above 0; anything else is refused with a
         * printed error
         */
@@ -342,7 +342,7 @@ namespace iine
       }
 
       /** \brief Set the number of threads; the result does not depend on it. Not in PCL's class.
-        * \param[in] number_of_threads 1 (the default) computes on the calling thread, 0 takes one per core; above 1024 it
+        * \param[in] number_of_threads 1 (the default) computes on the calling thread, 0 takes one per processor; above 1024 it
         * is refused with a printed error
         */
       void

@@ -1,4 +1,4 @@
-//! Step 5 of the paper, fast, for one tile of the image: rows of points go through a ring of integral rows, and
+//! Steps 4 and 5 of the paper, fast, for one tile of the image: rows of points go through a ring of integral rows, and
 //! every pixel takes its window's sum from it.
 
 use std::ops::Range;
