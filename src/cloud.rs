@@ -123,6 +123,8 @@ pub struct Points<'a> {
     y: *const f32,
     z: *const f32,
     grid: Grid,
+    /// As [`Points::beside`] says.
+    are_whole: bool,
     lifetime: PhantomData<&'a [f32]>,
 }
 
@@ -195,7 +197,7 @@ impl<'a> Points<'a> {
         for field in [x, y, z] {
             check_field(field, &grid)?;
         }
-        Ok(Points { x, y, z, grid, lifetime: PhantomData })
+        Ok(Points { x, y, z, grid, are_whole: false, lifetime: PhantomData })
     }
 
     /// Pixels in a row.
@@ -263,22 +265,23 @@ impl<'a> Points<'a> {
         }
     }
 
-    /// Whether the 16 bytes from a point's x are part of the same cloud, and of nothing that `normals` writes, for
-    /// every point but a row's last, or where rows follow each other the cloud's: then points can be read whole.
-    pub(crate) fn has_whole_points(&self, normals: &Normals) -> bool {
+    /// The same, to be read while `normals` are written. Whole if the 16 bytes from a point's x are part of the same cloud,
+    /// and of nothing that `normals` writes, for every point but a row's last, or where rows follow each other the cloud's.
+    pub(crate) fn beside(&self, normals: &Normals) -> Self {
         let interleaved = self.y == self.x.wrapping_add(1) && self.z == self.x.wrapping_add(2);
         let apart = |(field, grid): &(*const f32, Grid)| {
             let (start, end) = (self.x.addr(), self.x.addr() + self.grid.extent() + 3 * FIELD);
             end <= field.addr() || field.addr() + grid.extent() <= start
         };
-        interleaved
+        let are_whole = interleaved
             && self.grid.point_stride >= 3 * FIELD
-            && normals.fields().iter().flatten().all(apart)
+            && normals.fields().iter().flatten().all(apart);
+        Points { are_whole, ..*self }
     }
 
-    /// The points of row `y` in `columns`. `whole_points` as [`Points::has_whole_points`] says.
+    /// The points of row `y` in `columns`.
     #[inline(always)]
-    pub(crate) fn row(&self, y: usize, columns: Range<usize>, whole_points: bool) -> PointRow<'_> {
+    pub(crate) fn row(&self, y: usize, columns: Range<usize>) -> PointRow<'_> {
         assert!(y < self.grid.height && columns.end <= self.grid.width);
         let offset = self.grid.offset(columns.start, y);
         let step = self.grid.point_stride;
@@ -286,7 +289,7 @@ impl<'a> Points<'a> {
         let goes_on = y + 1 < self.grid.height && self.grid.row_stride == self.grid.width * step;
         let end = if goes_on { self.grid.width } else { self.grid.width - 1 };
         let inside = columns.end.min(end).saturating_sub(columns.start);
-        let whole = if whole_points { inside } else { 0 };
+        let whole = if self.are_whole { inside } else { 0 };
         let below = if y + 2 < self.grid.height { 2 * self.grid.row_stride } else { 0 };
         let first = self.x.wrapping_byte_add(offset);
         PointRow { points: self, y, columns, first, step, below, whole }

@@ -134,11 +134,11 @@ impl Estimator {
         indices: Option<&[i32]>,
         normals: &Normals,
     ) -> Result<(), Error> {
+        let points = &points.beside(normals);
         if !self.is_plain(points) {
             let Estimator { ref options, isa, ref mut scratch, .. } = *self;
             if options.semantics == Semantics::Paper && !options.has_second_pass() {
-                let whole_points = points.has_whole_points(normals);
-                let job = Job { isa, points, options, whole_points };
+                let job = Job { isa, points, options };
                 return fast::paper::compute(&job, indices, normals, scratch);
             }
             if !options.is_beyond_pcl() {
@@ -280,8 +280,7 @@ impl Estimator {
         let is_plain = self.is_plain(points);
         let Estimator { options, isa, scratch, cloud, second_pass } = self;
         let isa = *isa;
-        let whole_points = points.has_whole_points(normals);
-        let job = Job { isa, points, options, whole_points };
+        let job = Job { isa, points, options };
         scratch.prepare(options.threads)?;
         if is_plain {
             cloud.read(points, options)?;
@@ -289,13 +288,12 @@ impl Estimator {
             fast::paper::read_cloud(&job, cloud, scratch)?;
         }
         // To all windows, a point that misses a coordinate is missing whole.
-        let points = &packed(&cloud.points, cloud.width, cloud.height);
-        let whole_points = points.has_whole_points(normals);
+        let points = &packed(&cloud.points, cloud.width, cloud.height).beside(normals);
         // But for zeros, which are left out now, this is as PCL.
         if !is_plain && !options.has_second_pass() {
             return fast::compute(isa, points, options, indices, normals, scratch);
         }
-        let job = Job { points, whole_points, ..job };
+        let job = Job { points, ..job };
         // CM's sums are those of even windows too.
         let is_along = !is_plain && options.is_cm_of_paper();
         let own = is_along.then_some((indices, normals));

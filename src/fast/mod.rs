@@ -170,7 +170,6 @@ struct Job<'a> {
     points: &'a Points<'a>,
     options: &'a Options,
     image: Image,
-    whole_points: bool,
     /// How far points are apart, for [`scale_to_integers`].
     spacing: f32,
     /// Strips of the image, and of a slice.
@@ -233,7 +232,6 @@ fn compute_slices(
         points,
         options,
         image: Image { width, height, border_policy: options.border_policy },
-        whole_points: output.is_some_and(|(_, normals)| points.has_whole_points(normals)),
         spacing: if is_depth { spacing(points) } else { 0.0 },
         strips,
         per_slice: (SLICE_REACHES * expected).div_ceil(height / strips).min(strips),
@@ -369,7 +367,6 @@ impl Job<'_> {
                 columns: column..(column + columns).min(width),
                 rows: rows.clone(),
                 layers: &layers[..count],
-                whole_points: self.whole_points,
                 sides: windows.sides(width),
             };
             // SAFETY: the processor has the instruction set of the job, and tiles do not share pixels.

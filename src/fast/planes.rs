@@ -194,14 +194,13 @@ impl Planes {
         points: &Points,
         frame: &Frame,
         y: usize,
-        whole_points: bool,
         held: [f32; 2],
         filler: [f32; 3],
     ) -> f32 {
         let start = frame.start(3, y);
         let row = &mut self.data[start..start + 3 * frame.stride];
         assert!(MARGIN + frame.steps::<S>() * S::LANES <= frame.stride);
-        let points_of_row = points.row(y, frame.columns.clone(), whole_points);
+        let points_of_row = points.row(y, frame.columns.clone());
         let xs = row[MARGIN..].as_mut_ptr();
         // SAFETY: as the caller's; all lanes, and a group behind the columns, lie inside the planes.
         unsafe {

@@ -179,7 +179,6 @@ pub(crate) struct Tile<'a> {
     pub rows: Range<usize>,
     /// Those that the tile's pixels are in.
     pub layers: &'a [Layer],
-    pub whole_points: bool,
     pub sides: Sides<'a>,
 }
 
@@ -279,12 +278,12 @@ impl Tile<'_> {
         layer: &Layer,
         origin: [f32; 3],
     ) -> f32 {
-        let (points, whole_points, held) = (self.points, self.whole_points, layer.held);
+        let (points, held) = (self.points, layer.held);
         // As bits, which are in the order of positive floats.
         let mut largest = 0;
         for y in frame.rows.clone() {
             // SAFETY: as the caller's.
-            unsafe { planes.push::<S::Widest>(points, frame, y, whole_points, held, origin) };
+            unsafe { planes.push::<S::Widest>(points, frame, y, held, origin) };
             for (plane, origin) in planes.rows(frame, y).into_iter().zip(origin) {
                 let row = &plane[MARGIN..MARGIN + frame.columns.len()];
                 let bits = row.iter().map(|at| (at - origin).abs().to_bits());
@@ -312,7 +311,7 @@ impl Tile<'_> {
         origin: [f32; 3],
         limit: f32,
     ) -> Result<(), BeyondLimit> {
-        let (points, whole_points, held) = (self.points, self.whole_points, layer.held);
+        let (points, held) = (self.points, layer.held);
         let mut run = Run::default();
         let (before, after) = window_reach(side);
         let mut next = frame.rows.start;
@@ -320,9 +319,8 @@ impl Tile<'_> {
         for y in self.rows.clone() {
             while next < (y + after + 1).min(self.image.height) {
                 // SAFETY: as the caller's.
-                let largest = unsafe {
-                    planes.push::<S::Widest>(points, frame, next, whole_points, held, origin)
-                };
+                let largest =
+                    unsafe { planes.push::<S::Widest>(points, frame, next, held, origin) };
                 if largest > limit {
                     return Err(BeyondLimit);
                 }

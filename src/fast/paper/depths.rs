@@ -21,13 +21,12 @@ pub(crate) unsafe fn read<S: Along>(
     points: &Points,
     options: &Options,
     y: usize,
-    whole_points: bool,
     depths: &mut [f32],
 ) -> [f32; 2] {
     let width = points.width();
     let range = options.paper.depth == Depth::Range;
     let depths = &mut depths[..row_length(width)];
-    let points = points.row(y, 0..width, whole_points);
+    let points = points.row(y, 0..width);
     // SAFETY: as the caller's; all lanes lie inside the depths.
     unsafe {
         let none = S::splat(f32::NAN);

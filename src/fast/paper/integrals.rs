@@ -314,24 +314,17 @@ impl<const N: usize> Rings<N> {
         }
     }
 
-    /// Reads row `y` of the points, of which `depths` says which are missing. `whole_points` as
-    /// [`Points::has_whole_points`] says.
+    /// Reads row `y` of the points, of which `depths` says which are missing.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn read<S: Along>(
-        &mut self,
-        points: &Points,
-        depths: &[f32],
-        y: usize,
-        whole_points: bool,
-    ) {
+    pub unsafe fn read<S: Along>(&mut self, points: &Points, depths: &[f32], y: usize) {
         let stride = self.stride;
         let start = self.start_of_points(y);
         let length = self.columns.len().next_multiple_of(LANES);
         assert!(self.columns.start + length <= depths.len());
-        let points = points.row(y, self.columns.clone(), whole_points);
+        let points = points.row(y, self.columns.clone());
         let to = self.points[start..][..4 * stride].as_mut_ptr();
         // SAFETY: as the caller's; the depths and the row have room for whole pairs of groups.
         unsafe {

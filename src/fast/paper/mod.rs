@@ -197,7 +197,7 @@ pub(crate) fn read_cloud(
     cloud: &mut Cloud,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
-    let &Job { isa, points, options, whole_points } = job;
+    let &Job { isa, points, options } = job;
     cloud.resize(points, options)?;
     let super::Scratch { workers, each, .. } = scratch;
     let &mut Cloud { width, height, has_range, .. } = cloud;
@@ -213,9 +213,8 @@ pub(crate) fn read_cloud(
         let columns = &mut lock(&each[worker]).paper.columns;
         for (row, ((to, depths), sums)) in rows {
             let rows = to.chunks_mut(width).zip(depths.chunks_mut(width)).enumerate();
-            let mut rows = rows.map(|(line, (to, depths))| {
-                (points.row(row * BLOCK + line, 0..width, whole_points), to, depths)
-            });
+            let mut rows = rows
+                .map(|(line, (to, depths))| (points.row(row * BLOCK + line, 0..width), to, depths));
             let rows = PointRows { rows: &mut rows, sums, columns, options, range: has_range };
             // SAFETY: the processor has the instruction set.
             unsafe { paths::run(isa, rows) };
@@ -390,8 +389,6 @@ pub(crate) struct Job<'a> {
     pub isa: Isa,
     pub points: &'a Points<'a>,
     pub options: &'a Options,
-    /// As [`Points::has_whole_points`] says.
-    pub whole_points: bool,
 }
 
 // The stages are not inlined: profiles and the test of instruction counts tell them by name.
@@ -399,7 +396,7 @@ impl Job<'_> {
     /// All rows of depths, for [`even_windows`] and [`compute_of_blocks`] too.
     #[inline(never)]
     pub fn depths(&self, scratch: &mut super::Scratch) -> Result<(), Error> {
-        let &Job { points, options, whole_points, .. } = self;
+        let &Job { points, options, .. } = self;
         scratch.prepare(options.threads)?;
         let super::Scratch { workers, paper, .. } = scratch;
         let length = row_length(points.width());
@@ -407,7 +404,7 @@ impl Job<'_> {
         resize(&mut paper.ranges, points.height(), [0.0; 2])?;
         let rows = paper.depths[..length * points.height()].chunks_mut(length);
         workers.each(rows.zip(&mut paper.ranges).enumerate(), |(y, (depths, range))| {
-            let task = DepthsTask { points, options, y, whole_points, depths };
+            let task = DepthsTask { points, options, y, depths };
             // SAFETY: the processor has the instruction set.
             *range = unsafe { paths::run(self.isa, task) };
         });
@@ -501,7 +498,7 @@ impl Job<'_> {
         step: usize,
         left_out: Option<&Marks>,
     ) -> Result<(), Error> {
-        let &Job { points, options, whole_points, .. } = self;
+        let &Job { points, options, .. } = self;
         let super::Scratch { workers, each, listed, paper, .. } = scratch;
         let (width, height) = (points.width(), points.height());
         let sink = Sink::new(normals, indices, width, listed)?;
@@ -524,8 +521,7 @@ impl Job<'_> {
         }
         workers.for_each(grid.count(), |worker, item| {
             let Some((columns, rows)) = grid.tile(item) else { return };
-            let tile =
-                Tile { points, options, columns, rows, whole_points, largest, step, row, left_out };
+            let tile = Tile { points, options, columns, rows, largest, step, row, left_out };
             let scratch = &mut lock(&each[worker]).paper;
             each_layer(&tile, &paper.ranges, span(options.method), |layer| {
                 let (tile, sink) = (&tile, &sink);
@@ -551,7 +547,7 @@ impl Job<'_> {
         own: Option<Own>,
         largest: usize,
     ) -> Result<(), Error> {
-        let &Job { points, options, whole_points, .. } = self;
+        let &Job { points, options, .. } = self;
         let super::Scratch { workers, each, listed, paper, .. } = scratch;
         let left_out = own.as_ref().map(|own| own.concerned);
         let largest = if left_out.is_some() { largest.max(paper.largest) } else { largest };
@@ -572,8 +568,7 @@ impl Job<'_> {
         workers.for_each(grid.count(), |worker, item| {
             let Some((columns, rows)) = grid.tile(item) else { return };
             let step = 1;
-            let tile =
-                Tile { points, options, columns, rows, whole_points, largest, step, row, left_out };
+            let tile = Tile { points, options, columns, rows, largest, step, row, left_out };
             let blocks = Tile { step: BLOCK, left_out: None, ..tile.clone() };
             let tile = EvenTile { even, blocks, tile, sink: sink.as_ref() };
             let WorkerScratch { moments: rings, waiting, .. } = &mut lock(&each[worker]).paper;
@@ -630,7 +625,6 @@ struct DepthsTask<'a> {
     points: &'a Points<'a>,
     options: &'a Options,
     y: usize,
-    whole_points: bool,
     depths: &'a mut [f32],
 }
 
@@ -639,9 +633,9 @@ impl Task for DepthsTask<'_> {
 
     #[inline(always)]
     unsafe fn run<S: Groups>(self) -> [f32; 2] {
-        let DepthsTask { points, options, y, whole_points, depths } = self;
+        let DepthsTask { points, options, y, depths } = self;
         // SAFETY: as the caller's.
-        unsafe { depths::read::<S::Widest>(points, options, y, whole_points, depths) }
+        unsafe { depths::read::<S::Widest>(points, options, y, depths) }
     }
 }
 
@@ -771,11 +765,17 @@ mod tests {
                 let mut options = Options::default();
                 let mut scratch = super::super::Scratch::default();
                 scratch.prepare(1).unwrap();
-                for (whole_points, summed) in [(false, true), (true, false), (true, true)] {
+                let mut elsewhere = [0.0; 3];
+                let normals = Normals::interleaved(&mut elsewhere, 1, 1, 3, 0, None).unwrap();
+                for (points, summed) in [
+                    (points, true),
+                    (points.beside(&normals), false),
+                    (points.beside(&normals), true),
+                ] {
                     options.semantics = Semantics::Paper;
                     options.method = Method::CovarianceMatrix;
                     options.crease_windows = summed;
-                    let job = Job { isa, points: &points, options: &options, whole_points };
+                    let job = Job { isa, points: &points, options: &options };
                     let mut found = Cloud::default();
                     read_cloud(&job, &mut found, &mut scratch).unwrap();
                     let expected = Cloud::new(&points, &options).unwrap();
@@ -806,7 +806,7 @@ mod tests {
                 for semantics in Semantics::ALL {
                     options.semantics = semantics;
                     let cloud = Cloud::new(&points, &options).unwrap();
-                    let job = Job { isa, points: &points, options: &options, whole_points: false };
+                    let job = Job { isa, points: &points, options: &options };
                     let workers = Workers::default();
                     let [mut found, mut expected] = [(); 2].map(|()| DepthChanges::default());
                     find_depth_changes(&job, &mut found, &cloud, &workers).unwrap();
@@ -840,7 +840,7 @@ mod tests {
                 [Method::CovarianceMatrix, Method::Average3DGradient, Method::AverageDepthChange]
             {
                 options.method = method;
-                let job = Job { isa, points: &points, options: &options, whole_points: false };
+                let job = Job { isa, points: &points, options: &options };
                 let mut scratch = super::super::Scratch::default();
                 job.depths(&mut scratch).unwrap();
                 let mut found = vec![0.0; 4 * blocks.count()];

@@ -27,7 +27,6 @@ pub(crate) struct Tile<'a> {
     pub options: &'a Options,
     pub columns: Range<usize>,
     pub rows: Range<usize>,
-    pub whole_points: bool,
     /// How far a window reaches from its pixel at most.
     pub largest: usize,
     /// Columns and rows of the blocks whose middle pixels get the normals, at most `BLOCK`; the tile starts with one.
@@ -139,7 +138,7 @@ impl Tile<'_> {
     unsafe fn read<S: Groups, M: Sums<N>, const N: usize>(&self, rings: &mut Rings<N>, y: usize) {
         // SAFETY: as the caller's.
         unsafe {
-            rings.read::<S::Widest>(self.points, (self.row)(y).0, y, self.whole_points);
+            rings.read::<S::Widest>(self.points, (self.row)(y).0, y);
             if M::ENDS {
                 rings.note_presence::<S::Widest>(y);
             }
@@ -338,7 +337,7 @@ impl Tile<'_> {
     unsafe fn holds_only<S: Along>(&self, rect: &Rect, point: [f32; 3]) -> bool {
         let Rect { x: columns, y: rows } = rect;
         for row in rows.clone() {
-            let row = self.points.row(row, columns.clone(), self.whole_points);
+            let row = self.points.row(row, columns.clone());
             // SAFETY: as the caller's.
             unsafe {
                 let [x, y, z] = [S::splat(point[0]), S::splat(point[1]), S::splat(point[2])];
