@@ -8,7 +8,6 @@ use super::planes::{Frame, MARGIN, Planes, sum_between};
 use super::run::{Noted, OfRun, RUN};
 use super::tile::{Bits, Found, Pair, Sums, Tile, all};
 use crate::Error;
-use crate::cloud::Points;
 use crate::eigen::{Symmetric3, eigen};
 use crate::memory::{bytes, make_room};
 use crate::methods::Estimate;
@@ -62,7 +61,7 @@ pub(crate) struct WindowMoments<S: Simd> {
 
 /// The sums of points' moments about the first of them, and the number of points.
 #[cold]
-pub(crate) fn sum_of_moments(points: impl Iterator<Item = [f64; 3]>) -> ([f64; CHANNELS], f64) {
+fn sum_of_moments(points: impl Iterator<Item = [f64; 3]>) -> ([f64; CHANNELS], f64) {
     let (mut sums, mut count) = ([0.0; CHANNELS], 0.0);
     let mut origin = None;
     points.for_each(|point| {
@@ -382,27 +381,6 @@ impl Sums for Moments {
     }
 
     #[inline(always)]
-    unsafe fn afresh<S: Groups>(
-        points: &Points,
-        image: &Image,
-        windows: impl Fn(usize) -> ((usize, usize), usize),
-        lanes: u32,
-        run: &mut Matrices,
-        at: usize,
-    ) -> bool {
-        let sum_up = |lane: usize| {
-            let ((x, y), side) = windows(lane);
-            let half = (side / 2) as isize;
-            let window = (x as isize - half, y as isize - half);
-            let pixels = image.rects(window, (side, side)).flat_map(|(rect, _)| rect.pixels());
-            sum_of_moments(pixels.map(|(x, y)| points.at(x, y).map(f64::from)))
-        };
-        // SAFETY: as the caller's.
-        unsafe { run.note_afresh::<S>(at, lanes, sum_up) };
-        true
-    }
-
-    #[inline(always)]
     unsafe fn estimate<S: Simd>(
         &self,
         run: &Matrices,
@@ -412,16 +390,6 @@ impl Sums for Moments {
     ) -> Found<S> {
         // SAFETY: as the caller's.
         unsafe { run.normals(at, if fresh { 0.0 } else { self.error }) }
-    }
-
-    fn precisely(
-        &self,
-        _tile: &Tile,
-        _window: ((usize, usize), usize),
-        run: &Matrices,
-        at: usize,
-    ) -> Option<Estimate> {
-        run.precisely(at)
     }
 }
 
@@ -458,6 +426,47 @@ impl Noted for Matrices {
             self.unsettled[at / LANES] = unsafe { self.newton_steps::<S::Pair>(at, *lanes) };
         }
     }
+
+    #[inline(always)]
+    unsafe fn afresh<S: Groups, P: Iterator<Item = [f64; 3]>>(
+        &mut self,
+        at: usize,
+        lanes: u32,
+        points: impl Fn(usize) -> P,
+    ) -> bool {
+        let (mut sums, mut shares) = ([[0.0; LANES]; CHANNELS], [0.0; LANES]);
+        for lane in Bits(lanes) {
+            let (moments, count) = sum_of_moments(points(lane));
+            for c in 0..CHANNELS {
+                sums[c][lane] = moments[c];
+            }
+            shares[lane] = 1.0 / count;
+        }
+        for group in (0..LANES).step_by(GROUP) {
+            // SAFETY: as the caller's; the arrays hold whole groups.
+            unsafe {
+                let share = Doubles(S::load_d(shares.as_ptr().add(group)));
+                let mut of8 = [share; CHANNELS];
+                for c in 0..CHANNELS {
+                    of8[c] = Doubles(S::load_d(sums[c].as_ptr().add(group)));
+                }
+                self.note::<S>(&WindowMoments { sums: of8, share }, at + group);
+            }
+        }
+        true
+    }
+
+    /// In doubles, from moments about one of the window's points; none if rounding leaves it doubtful.
+    #[cold]
+    fn precisely(&self, at: usize) -> Option<Estimate> {
+        let [xx, xy, xz, yy, yz, zz] = self.elements.of_one(at);
+        let (values, vector) = eigen(&Symmetric3 { xx, xy, xz, yy, yz, zz });
+        // The matrix is over its trace, which may be rounding alone.
+        let [trace] = self.trace.of_one(at);
+        let curvature = (values[0] / (xx + yy + zz)) as f32;
+        (trace > 0.0 && LEAST_GAP < values[1] - values[0])
+            .then(|| Estimate { normal: vector.map(|c| c as f32), curvature })
+    }
 }
 
 impl Matrices {
@@ -487,52 +496,6 @@ impl Matrices {
             self.trace.store::<S>(at, [trace]);
             self.polynomial.store::<S>(at, [c0, c1, c2]);
         }
-    }
-
-    /// As [`Matrices::note`], of some lanes of a pair of groups; `sum_up` gives the moments of a lane's window, and
-    /// the number of its points.
-    ///
-    /// # Safety
-    /// As [`Matrices::note`].
-    #[inline(always)]
-    pub unsafe fn note_afresh<S: Groups>(
-        &mut self,
-        at: usize,
-        lanes: u32,
-        sum_up: impl Fn(usize) -> ([f64; CHANNELS], f64),
-    ) {
-        let (mut sums, mut shares) = ([[0.0; LANES]; CHANNELS], [0.0; LANES]);
-        for lane in Bits(lanes) {
-            let (moments, count) = sum_up(lane);
-            for c in 0..CHANNELS {
-                sums[c][lane] = moments[c];
-            }
-            shares[lane] = 1.0 / count;
-        }
-        for group in (0..LANES).step_by(GROUP) {
-            // SAFETY: as the caller's; the arrays hold whole groups.
-            unsafe {
-                let share = Doubles(S::load_d(shares.as_ptr().add(group)));
-                let mut of8 = [share; CHANNELS];
-                for c in 0..CHANNELS {
-                    of8[c] = Doubles(S::load_d(sums[c].as_ptr().add(group)));
-                }
-                self.note::<S>(&WindowMoments { sums: of8, share }, at + group);
-            }
-        }
-    }
-
-    /// The estimate of the pixel that is `at` in the run, in doubles, from moments about one of its window's points; none if
-    /// rounding leaves it doubtful.
-    #[cold]
-    pub fn precisely(&self, at: usize) -> Option<Estimate> {
-        let [xx, xy, xz, yy, yz, zz] = self.elements.of_one(at);
-        let (values, vector) = eigen(&Symmetric3 { xx, xy, xz, yy, yz, zz });
-        // The matrix is over its trace, which may be rounding alone.
-        let [trace] = self.trace.of_one(at);
-        let curvature = (values[0] / (xx + yy + zz)) as f32;
-        (trace > 0.0 && LEAST_GAP < values[1] - values[0])
-            .then(|| Estimate { normal: vector.map(|c| c as f32), curvature })
     }
 
     /// From what is near the least roots to these; returns the lanes whose steps have not ended.

@@ -7,6 +7,7 @@ use std::ops::{Add, Sub};
 
 use super::arithmetic::{Doubles, Floats, Integers};
 use super::lanes::LANES;
+use crate::methods::Estimate;
 use crate::simd::{Groups, Simd};
 
 /// Pixels in a run at most: more than a processor works at, and little enough for its first-level cache.
@@ -129,6 +130,27 @@ pub(crate) trait Noted: Default {
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn solve<S: Groups>(&mut self, _at: usize, _lanes: &[u32]) {}
+
+    /// Notes windows of some lanes of the pair of groups from `at` on anew, without the rings' rounding; returns whether: else
+    /// they are left to the plain form. What was noted of the pair before is lost. `points` gives those of a lane's window.
+    ///
+    /// # Safety
+    /// As [`Noted::solve`].
+    #[inline(always)]
+    unsafe fn afresh<S: Groups, P: Iterator<Item = [f64; 3]>>(
+        &mut self,
+        _at: usize,
+        _lanes: u32,
+        _points: impl Fn(usize) -> P,
+    ) -> bool {
+        false
+    }
+
+    /// The estimate of the pixel that is `at`, where it is doubtful even after [`Noted::afresh`]; none if it is left to the
+    /// plain form.
+    fn precisely(&self, _at: usize) -> Option<Estimate> {
+        None
+    }
 }
 
 impl<T: Lane, const N: usize> Noted for OfRun<T, N> {}

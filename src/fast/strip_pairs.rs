@@ -209,13 +209,7 @@ impl Sums for StripPairs {
     }
 
     #[cold]
-    fn precisely(
-        &self,
-        tile: &Tile,
-        (pixel, side): ((usize, usize), usize),
-        _run: &Gradients,
-        _at: usize,
-    ) -> Option<Estimate> {
+    fn precisely(&self, tile: &Tile, (pixel, side): ((usize, usize), usize)) -> Option<Estimate> {
         let is_inside = tile.inner(side, pixel.1).contains(&pixel.0);
         is_inside.then(|| average_3d_gradient::estimate_of_finite(tile.points, pixel, side))
     }

@@ -13,7 +13,7 @@ use super::windows::Sides;
 use crate::Error;
 use crate::cloud::Points;
 use crate::depth_change::is_depth_change;
-use crate::methods::{Estimate, estimate_window};
+use crate::methods::{Estimate, estimate_window, start};
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
 use crate::simd::{GROUP, Groups, Simd};
@@ -39,12 +39,42 @@ impl<S: Simd> Found<S> {
         self.curvature.take(mask, other.curvature);
     }
 
+    /// Takes, for some lanes of a pair of groups that are doubtful, which is `at` in its run, what their windows give if they are
+    /// summed afresh, as `estimate` says, or else `precisely`; returns the others. `points` are those of a lane's window.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `G`.
+    #[inline(always)]
+    pub unsafe fn settle<G: Groups<Pair = S>, R: Noted, P: Iterator<Item = [f64; 3]>>(
+        &mut self,
+        mut doubtful: u32,
+        run: &mut R,
+        at: usize,
+        points: impl Fn(usize) -> P,
+        estimate: impl FnOnce(&R) -> Found<S>,
+        precisely: impl Fn(usize) -> Option<Estimate>,
+    ) -> u32 {
+        // SAFETY: as the caller's.
+        unsafe {
+            if run.afresh::<G, P>(at, doubtful, points) {
+                run.solve::<G>(at, &[doubtful]);
+                let fresh = estimate(run);
+                self.take(doubtful, &fresh);
+                doubtful &= fresh.doubtful;
+            }
+            if doubtful == 0 {
+                return 0;
+            }
+            self.take_precise(doubtful, |lane| run.precisely(at + lane).or_else(|| precisely(lane)))
+        }
+    }
+
     /// Takes those that `precisely` gives for some lanes; returns the others.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn take_precise(
+    unsafe fn take_precise(
         &mut self,
         lanes: u32,
         precisely: impl Fn(usize) -> Option<Estimate>,
@@ -126,37 +156,14 @@ pub(crate) trait Sums {
         at: usize,
     ) -> u32;
 
-    /// Notes windows of some lanes of a pair of groups, which is `at` in its run, from their points, without the rings'
-    /// rounding; returns whether: else they are left to the plain form. What was noted of the pair before is lost.
-    /// `windows` gives a lane's pixel and side.
-    ///
-    /// # Safety
-    /// As [`Sums::push`].
-    unsafe fn afresh<S: Groups>(
-        _points: &Points,
-        _image: &Image,
-        _windows: impl Fn(usize) -> ((usize, usize), usize),
-        _lanes: u32,
-        _run: &mut Self::OfRun,
-        _at: usize,
-    ) -> bool {
-        false
-    }
-
-    /// The estimate of the pixel that is `at` in a run, where it is doubtful, even after [`Sums::afresh`] if the method has
-    /// that; none if it is left to the plain form. `window` is its own and the side of its window.
-    fn precisely(
-        &self,
-        _tile: &Tile,
-        _window: ((usize, usize), usize),
-        _run: &Self::OfRun,
-        _at: usize,
-    ) -> Option<Estimate> {
+    /// The estimate of a pixel that is doubtful, where its run has none; none if it is left to the plain form. `window` is the
+    /// pixel and the side of its window.
+    fn precisely(&self, _tile: &Tile, _window: ((usize, usize), usize)) -> Option<Estimate> {
         None
     }
 
     /// The estimates of the pixels from `at` on in a run, which are solved; `sides` are those of their windows. Whether
-    /// their sums are from [`Sums::afresh`], `fresh` tells.
+    /// their sums are from [`Noted::afresh`], `fresh` tells.
     ///
     /// # Safety
     /// As [`Sums::push`].
@@ -468,18 +475,11 @@ impl Tile<'_> {
                 }
                 if doubtful != 0 {
                     let window = |lane: usize| ((x + lane, y), row[x + lane] as usize);
-                    let (points, image) = (self.points, self.image);
-                    if M::afresh::<S>(points, image, window, doubtful, of_run, at) {
-                        of_run.solve::<S>(at, &[doubtful]);
-                        let fresh = sums.estimate::<S::Pair>(of_run, at, sides, true);
-                        found.take(doubtful, &fresh);
-                        doubtful &= fresh.doubtful;
-                    }
-                    if doubtful != 0 {
-                        doubtful = found.take_precise(doubtful, |lane| {
-                            sums.precisely(self, window(lane), of_run, at + lane)
-                        });
-                    }
+                    let points = |lane: usize| self.points_in(window(lane));
+                    let estimate = |run: &_| sums.estimate::<S::Pair>(run, at, sides, true);
+                    let precisely = |lane: usize| sums.precisely(self, window(lane));
+                    doubtful =
+                        found.settle::<S, _, _>(doubtful, of_run, at, points, estimate, precisely);
                 }
                 let plain = windows & !lanes[number] | doubtful;
                 let column = frame.column(x);
@@ -532,6 +532,16 @@ impl Tile<'_> {
             return lanes;
         }
         Bits(lanes).which(|lane| are_alike(lane..=lane, side(lane)))
+    }
+
+    /// The points of a pixel's window, all of which are finite.
+    fn points_in(
+        &self,
+        (pixel, side): ((usize, usize), usize),
+    ) -> impl Iterator<Item = [f64; 3]> + use<'_> {
+        let window = (start(pixel.0, side), start(pixel.1, side));
+        let pixels = self.image.rects(window, (side, side)).flat_map(|(rect, _)| rect.pixels());
+        pixels.map(|(x, y)| self.points.at(x, y).map(f64::from))
     }
 
     /// The normals of some lanes of those that begin with pixel `(x, y)`, by the plain form.

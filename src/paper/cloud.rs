@@ -113,7 +113,7 @@ pub(crate) trait CleanPoints {
     fn at(&self, x: usize, y: usize) -> [f32; 3];
 
     /// The finite points of a rectangle, in double precision.
-    fn finite(&self, rect: &Rect) -> impl Iterator<Item = [f64; 3]> {
+    fn finite(&self, rect: Rect) -> impl Iterator<Item = [f64; 3]> {
         rect.pixels()
             .map(|(x, y)| self.at(x, y))
             .filter(|point| !point[2].is_nan())
@@ -126,8 +126,8 @@ impl CleanPoints for Cloud {
         self.points[self.index(x, y)]
     }
 
-    fn finite(&self, rect: &Rect) -> impl Iterator<Item = [f64; 3]> {
-        let Rect { x: columns, y: rows } = rect.clone();
+    fn finite(&self, rect: Rect) -> impl Iterator<Item = [f64; 3]> {
+        let Rect { x: columns, y: rows } = rect;
         let rows = rows.map(move |y| &self.points[y * self.width..][columns.clone()]);
         rows.flatten().filter(|point| !point[2].is_nan()).map(|point| point.map(f64::from))
     }

@@ -11,7 +11,9 @@ pub(crate) fn estimate(method: Method, cloud: &impl CleanPoints, rect: &Rect) ->
     match method {
         Method::AverageDepthChange => smoothed_depth_changes(cloud, rect),
         Method::Average3DGradient | Method::Simple3DGradient => gradients(cloud, rect),
-        Method::CovarianceMatrix => plane_of(|| cloud.finite(rect)).unwrap_or(Estimate::NONE),
+        Method::CovarianceMatrix => {
+            plane_of(|| cloud.finite(rect.clone())).unwrap_or(Estimate::NONE)
+        }
     }
 }
 

@@ -37,7 +37,7 @@ impl Plane {
 
     /// None if there are too few finite points to tell how well the plane fits, or if they are on one line of the image.
     pub fn of(cloud: &Cloud, rect: &Rect) -> Option<Plane> {
-        let scatter = Scatter::of(|| cloud.finite(rect))?;
+        let scatter = Scatter::of(|| cloud.finite(rect.clone()))?;
         let (m, n) = (scatter.mean, scatter.count);
         if n < Self::FEWEST {
             return None;

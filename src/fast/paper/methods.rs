@@ -4,12 +4,10 @@
 use super::integrals::{Around, Channels, Rings, WEIGHT};
 use super::rects::Rects;
 use crate::fast::arithmetic::{Doubles, Floats, cross, dot};
-use crate::fast::moments::{Matrices, WindowMoments, sum_of_moments};
+use crate::fast::moments::{Matrices, WindowMoments};
 use crate::fast::run::{Noted, OfRun};
 use crate::fast::tile::{Bits, Found};
-use crate::methods::Estimate;
-use crate::paper::{CleanPoints, ROUNDING};
-use crate::rect::Rect;
+use crate::paper::ROUNDING;
 use crate::simd::{GROUP, Groups, Simd};
 
 /// A method's sums and normals.
@@ -43,27 +41,6 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
         run: &mut Self::OfRun,
         at: usize,
     );
-
-    /// Notes windows of some lanes of a pair of groups, which is `at` in its run, from their points, without the rings'
-    /// rounding; returns whether: else they are left to the plain form. What was noted of the pair before is lost.
-    ///
-    /// # Safety
-    /// As [`Sums::note`].
-    unsafe fn afresh<S: Groups>(
-        _points: &impl CleanPoints,
-        _rect: impl Fn(usize) -> Rect,
-        _lanes: u32,
-        _run: &mut Self::OfRun,
-        _at: usize,
-    ) -> bool {
-        false
-    }
-
-    /// The estimate of the pixel that is `at` in a run, where it is doubtful even after [`Sums::afresh`]; none if it is left
-    /// to the plain form.
-    fn precisely(_run: &Self::OfRun, _at: usize) -> Option<Estimate> {
-        None
-    }
 
     /// The normals of the pixels from `at` on in a run, which are solved.
     ///
@@ -153,27 +130,9 @@ impl Sums<MOMENTS> for CovarianceMatrix {
     }
 
     #[inline(always)]
-    unsafe fn afresh<S: Groups>(
-        points: &impl CleanPoints,
-        rect: impl Fn(usize) -> Rect,
-        lanes: u32,
-        run: &mut Matrices,
-        at: usize,
-    ) -> bool {
-        let sum_up = |lane: usize| sum_of_moments(points.finite(&rect(lane)));
-        // SAFETY: as the caller's.
-        unsafe { run.note_afresh::<S>(at, lanes, sum_up) };
-        true
-    }
-
-    #[inline(always)]
     unsafe fn estimate<S: Simd>(run: &Matrices, at: usize, error: f64) -> Found<S> {
         // SAFETY: as the caller's.
         unsafe { run.normals(at, error) }
-    }
-
-    fn precisely(run: &Matrices, at: usize) -> Option<Estimate> {
-        run.precisely(at)
     }
 }
 

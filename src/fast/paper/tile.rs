@@ -278,14 +278,10 @@ impl Tile<'_> {
                     let of_one_point = self.of_one_point::<S::Widest>(pixel, rect, plain);
                     (windows, plain) = (windows & !of_one_point, plain & !of_one_point);
                 }
-                if plain != 0 && M::afresh::<S>(&cleaned, rect, plain, sums, at) {
-                    sums.solve::<S>(at, &[plain]);
-                    let fresh = M::estimate::<S::Pair>(sums, at, 0.0);
-                    found.take(plain, &fresh);
-                    plain &= fresh.doubtful;
-                    if plain != 0 {
-                        plain = found.take_precise(plain, |lane| M::precisely(sums, at + lane));
-                    }
+                if plain != 0 {
+                    let points = |lane: usize| cleaned.finite(rect(lane));
+                    let estimate = |run: &_| M::estimate::<S::Pair>(run, at, 0.0);
+                    plain = found.settle::<S, _, _>(plain, sums, at, points, estimate, |_| None);
                 }
                 let viewpoint = self.options.viewpoint;
                 let (sure, here) = (windows & !plain, points.load::<S::Pair>(at));
