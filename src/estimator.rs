@@ -2,20 +2,14 @@
 
 use crate::Error;
 use crate::cloud::{Normals, Points};
-use crate::depth_change::depth_change_map;
-use crate::distance::distance_map;
-use crate::eigenvalues::eigenvalue_map;
-use crate::fast::paper::{Job, Own, WithEven};
+use crate::fast::paper::{FastEngine, Job};
 use crate::fast::{self, SIZES, Scratch};
 use crate::isa::Isa;
-use crate::memory::{refill, resize};
-use crate::methods::{Estimate, estimate_window, start};
+use crate::methods::{Estimate, estimate_window};
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
-use crate::paper::{
-    self, Asked, Blocks, Cloud, DepthChanges, EvenWindows, Marks, PaperMaps, SecondPass, Windows,
-};
-use crate::smoothing_area::window_side;
+use crate::paper::{self, Cloud, PaperMaps, SecondPass};
+use crate::plain::{Plain, PlainEngine};
 use crate::threads::Workers;
 use crate::window::Image;
 
@@ -144,9 +138,10 @@ impl Estimator {
             if !options.is_beyond_pcl() {
                 return fast::compute(isa, points, options, indices, normals, scratch);
             }
+            return self.compute_beyond_pcl(points, indices, normals);
         }
         if self.options.is_beyond_pcl() {
-            return self.compute_beyond_pcl(points, indices, normals);
+            return self.compute_beyond_pcl_plainly(points, indices, normals);
         }
         let width = points.width();
         let plain = Plain::new(points, &self.options)?;
@@ -270,65 +265,66 @@ impl Estimator {
         self.options.zero_is_missing.then(cleaned).transpose()
     }
 
-    /// As [`Estimator::compute_pixels`], where PCL's windows and sums alone are not what is asked for.
+    /// As [`Estimator::compute_pixels`], by the plain form, where PCL's windows and sums alone are not what is asked for.
+    fn compute_beyond_pcl_plainly(
+        &mut self,
+        points: &Points,
+        indices: Option<&[i32]>,
+        normals: &Normals,
+    ) -> Result<(), Error> {
+        let Estimator { options, scratch, cloud, second_pass, .. } = self;
+        scratch.prepare(options.threads)?;
+        cloud.read(points, options)?;
+        let points = &packed(&cloud.points, cloud.width, cloud.height);
+        let workers = scratch.workers();
+        let mut engine = PlainEngine { points, options, workers };
+        second_pass.compute(cloud, options, &mut engine)?;
+        let own = engine.own(second_pass.sizes())?;
+        write(normals, indices, cloud.width, workers, |_, at| {
+            Some(second_pass.chosen(cloud, options, at).unwrap_or_else(|| own(at)))
+        });
+        write_around(cloud, options, second_pass, indices, normals, workers);
+        Ok(())
+    }
+
+    /// The same, fast.
     fn compute_beyond_pcl(
         &mut self,
         points: &Points,
         indices: Option<&[i32]>,
         normals: &Normals,
     ) -> Result<(), Error> {
-        let is_plain = self.is_plain(points);
         let Estimator { options, isa, scratch, cloud, second_pass } = self;
         let isa = *isa;
         let job = Job { isa, points, options };
         scratch.prepare(options.threads)?;
-        if is_plain {
-            cloud.read(points, options)?;
-        } else {
-            fast::paper::read_cloud(&job, cloud, scratch)?;
-        }
+        fast::paper::read_cloud(&job, cloud, scratch)?;
         // To all windows, a point that misses a coordinate is missing whole.
         let points = &packed(&cloud.points, cloud.width, cloud.height).beside(normals);
         // But for zeros, which are left out now, this is as PCL.
-        if !is_plain && !options.has_second_pass() {
+        if !options.has_second_pass() {
             return fast::compute(isa, points, options, indices, normals, scratch);
         }
         let job = Job { points, ..job };
         // CM's sums are those of even windows too.
-        let is_along = !is_plain && options.is_cm_of_paper();
+        let is_along = options.is_cm_of_paper();
         let own = is_along.then_some((indices, normals));
-        let mut engine = Engine { job, scratch, own, is_plain };
-        second_pass.compute(cloud, options, &mut engine)?;
-        let width = cloud.width;
-        let is_whole = !is_plain && indices.is_none();
-        let chosen = |at: usize| second_pass.chosen(cloud, options, at);
-        if is_plain {
-            let own = engine.own(second_pass.sizes())?;
-            let estimate = |at: usize| chosen(at).unwrap_or_else(|| own(at));
-            write(normals, indices, width, engine.scratch.workers(), |_, at| Some(estimate(at)));
-        } else {
-            if options.semantics == Semantics::Pcl {
-                fast::compute(isa, points, options, indices, normals, scratch)?;
-            } else if !is_along {
-                let choices = second_pass.choices();
-                fast::paper::compute_own(&job, choices, indices, normals, scratch)?;
-            }
-            let workers = scratch.workers();
-            let of_left = is_along.then_some(points);
-            if is_whole {
-                fast::paper::write_chosen(&job, second_pass, cloud, normals, of_left, workers);
-            } else {
-                let left = |at| second_pass.left(of_left?, options, at);
-                write(normals, indices, width, workers, |_, at| chosen(at).or_else(|| left(at)));
-            }
+        second_pass.compute(cloud, options, &mut FastEngine { job, scratch, own })?;
+        if options.semantics == Semantics::Pcl {
+            fast::compute(isa, points, options, indices, normals, scratch)?;
+        } else if !is_along {
+            fast::paper::compute_own(&job, second_pass.choices(), indices, normals, scratch)?;
         }
-        if options.one_sided_windows && !is_whole {
-            write(normals, indices, width, scratch.workers(), |(x, y), at| {
-                // SAFETY: every normal has been written, and falls to one thread.
-                let has_normal = || unsafe { normals.has_normal(x, y) };
-                second_pass.estimate_around(cloud, options, at, has_normal)
-            });
+        let workers = scratch.workers();
+        let of_left = is_along.then_some(points);
+        if indices.is_none() {
+            fast::paper::write_chosen(&job, second_pass, cloud, normals, of_left, workers);
+            return Ok(());
         }
+        let chosen = |at| second_pass.chosen(cloud, options, at);
+        let left = |at| second_pass.left(of_left?, options, at);
+        write(normals, indices, cloud.width, workers, |_, at| chosen(at).or_else(|| left(at)));
+        write_around(cloud, options, second_pass, indices, normals, workers);
         Ok(())
     }
 
@@ -370,196 +366,26 @@ fn write(
     }
 }
 
+/// With one-sided windows writes the estimates of the pixels that have no normal, where the points around them give one.
+fn write_around(
+    cloud: &Cloud,
+    options: &Options,
+    second_pass: &SecondPass,
+    indices: Option<&[i32]>,
+    normals: &Normals,
+    workers: &Workers,
+) {
+    if options.one_sided_windows {
+        write(normals, indices, cloud.width, workers, |(x, y), at| {
+            // SAFETY: every normal has been written, and falls to one thread.
+            let has_normal = || unsafe { normals.has_normal(x, y) };
+            second_pass.estimate_around(cloud, options, at, has_normal)
+        });
+    }
+}
+
 /// A view of packed points, as many as the size says.
 fn packed(points: &[[f32; 3]], width: usize, height: usize) -> Points<'_> {
     Points::interleaved(points.as_flattened(), width, height, 3, 0)
         .expect("a packed copy of a valid cloud")
-}
-
-/// A view of `width` x `height` estimates.
-fn normals_of(
-    estimates: &mut Vec<[f32; 4]>,
-    (width, height): (usize, usize),
-) -> Result<Normals<'_>, Error> {
-    resize(estimates, width * height, Estimate::NONE.into())?;
-    Normals::interleaved(estimates.as_flattened_mut(), width, height, 4, 0, Some(3))
-}
-
-/// The windows and estimates that the one-sided and crease windows build on.
-struct Engine<'a> {
-    job: Job<'a>,
-    scratch: &'a mut Scratch,
-    /// Where the estimates of the pixels that are not concerned are written along with even windows, as [`write`] has it.
-    own: Option<(Option<&'a [i32]>, &'a Normals<'a>)>,
-    is_plain: bool,
-}
-
-impl Engine<'_> {
-    /// The plain form's estimates of the windows of these radii, by block, around blocks' middle pixels.
-    fn plain_of_blocks(
-        &self,
-        blocks: &Blocks,
-        radius: impl Fn(usize) -> u32,
-        estimates: &mut Vec<[f32; 4]>,
-    ) -> Result<(), Error> {
-        let Job { points, options, .. } = self.job;
-        let of_block = |block: usize| {
-            paper::of_radius(points, options, blocks.middle(block), radius(block)).into()
-        };
-        refill(estimates, (0..blocks.count()).map(of_block))
-    }
-
-    /// The plain form of the pixels' own estimates, from windows of these sizes.
-    fn own(&self, sizes: &[f32]) -> Result<impl Fn(usize) -> Estimate + Sync, Error> {
-        let Job { points, options, .. } = self.job;
-        let width = points.width();
-        let is_pcl = options.semantics == Semantics::Pcl;
-        let of_pcl = is_pcl.then(|| Plain::new(points, options)).transpose()?;
-        Ok(move |at: usize| {
-            let (x, y) = (at % width, at / width);
-            let of_paper = || paper::of_radius(points, options, (x, y), sizes[at] as u32);
-            of_pcl.as_ref().map_or_else(of_paper, |plain| plain.estimate(x, y))
-        })
-    }
-}
-
-impl paper::Engine for Engine<'_> {
-    fn workers(&self) -> &Workers {
-        self.scratch.workers()
-    }
-
-    fn sizes(&mut self, sizes: &mut Vec<f32>) -> Result<(), Error> {
-        let Engine { job, ref mut scratch, is_plain, .. } = *self;
-        let Job { isa, points, options, .. } = job;
-        let (width, height) = (points.width(), points.height());
-        match (options.semantics, is_plain) {
-            (Semantics::Pcl, true) => {
-                let plain = Plain::new(points, options)?;
-                let side = |at: usize| plain.window_side(at % width, at / width) as f32;
-                refill(sizes, (0..width * height).map(side))
-            }
-            (Semantics::Pcl, false) => {
-                job.depths(scratch)?;
-                fast::sides(isa, points, options, sizes, scratch)
-            }
-            (_, true) => {
-                let maps = PaperMaps::new(points, options)?;
-                refill(sizes, maps.smoothing_radii.iter().map(|radius| radius.trunc()))
-            }
-            (_, false) => fast::paper::radii(&job, sizes, scratch),
-        }
-    }
-
-    fn find_depth_changes(&self, changes: &mut DepthChanges, cloud: &Cloud) -> Result<(), Error> {
-        let Engine { job, scratch, is_plain, .. } = self;
-        let workers = scratch.workers();
-        if *is_plain {
-            paper::find_depth_changes(changes, cloud, job.options, workers)
-        } else {
-            fast::paper::find_depth_changes(job, changes, cloud, workers)
-        }
-    }
-
-    fn even_windows(
-        &mut self,
-        cloud: &Cloud,
-        asked: &Asked,
-        concerned: &Marks,
-        found: &mut Windows,
-    ) -> Result<(), Error> {
-        let method = Method::CovarianceMatrix;
-        let has_normals = self.job.options.method == method;
-        let Windows { even, of_even, .. } = found;
-        if self.is_plain {
-            refill(even, paper::even_windows(cloud, asked))?;
-            if has_normals {
-                let blocks = &asked.blocks;
-                self.plain_of_blocks(blocks, |block| even[block].radius as u32, of_even)?;
-            }
-            return Ok(());
-        }
-        let size = (asked.blocks.across, asked.blocks.down);
-        let of_even = normals_of(of_even, size)?;
-        let own = self.own.map(|(indices, normals)| Own { concerned, indices, normals });
-        let along = has_normals.then_some(WithEven { of_even: &of_even, own });
-        // CM's sums are what even windows are made from.
-        let options = &Options { method, ..self.job.options.clone() };
-        let job = Job { options, ..self.job };
-        fast::paper::even_windows(&job, (cloud, asked), even, along, self.scratch)
-    }
-
-    fn choices(&mut self, even: &EvenWindows, choices: &mut [u32]) {
-        if self.is_plain {
-            even.choose(choices);
-        } else {
-            fast::paper::choices(self.job.isa, even, choices, self.scratch);
-        }
-    }
-
-    fn of_blocks(
-        &mut self,
-        blocks: &Blocks,
-        radii: &[u32],
-        estimates: &mut Vec<[f32; 4]>,
-    ) -> Result<(), Error> {
-        if self.is_plain {
-            let radius = |block: usize| radii[block];
-            return self.plain_of_blocks(blocks, radius, estimates);
-        }
-        let normals = normals_of(estimates, (blocks.across, blocks.down))?;
-        fast::paper::compute_of_blocks(&self.job, radii, &normals, self.scratch)
-    }
-}
-
-/// The plain form of the whole method: the specification that every fast path is held to.
-struct Plain<'a> {
-    points: &'a Points<'a>,
-    options: &'a Options,
-    image: Image,
-    depth_changes: Vec<bool>,
-    distances: Vec<f32>,
-}
-
-impl<'a> Plain<'a> {
-    fn new(points: &'a Points, options: &'a Options) -> Result<Self, Error> {
-        let (width, height) = (points.width(), points.height());
-        let depth_changes = depth_change_map(points, options.max_depth_change_factor)?;
-        let distances = distance_map(&depth_changes, width, height)?;
-        let image = Image { width, height, border_policy: options.border_policy };
-        Ok(Plain { points, options, image, depth_changes, distances })
-    }
-
-    /// The side of a pixel's window; 0 for none.
-    fn window_side(&self, x: usize, y: usize) -> u32 {
-        let Image { width, height, .. } = self.image;
-        let border = self.options.ignored_border();
-        let inside = |at: usize, size: usize| at >= border && at < size.saturating_sub(border);
-        if !(inside(x, width) && inside(y, height)) {
-            return 0;
-        }
-        window_side(self.distances[y * width + x], self.points.z(x, y), self.options)
-    }
-
-    fn estimate(&self, x: usize, y: usize) -> Estimate {
-        let side = self.window_side(x, y) as usize;
-        if side == 0 {
-            return Estimate::NONE;
-        }
-        let (points, image) = (self.points, &self.image);
-        let found = estimate_window(self.options.method, points, image, (x, y), (side, side));
-        turn_to_viewpoint(found, self.points.at(x, y), self.options.viewpoint)
-    }
-
-    /// The eigenvalues of the covariance matrices of all pixels' windows.
-    fn eigenvalue_map(&self) -> Result<Vec<[f32; 3]>, Error> {
-        let window = |x: usize, y: usize| {
-            let side = self.window_side(x, y) as usize;
-            let first = (start(x, side), start(y, side));
-            let rects = self.image.rects(first, (side, side));
-            (side > 0).then(|| rects.map(|(rect, _)| rect))
-        };
-        let Image { width, height, .. } = self.image;
-        let sides = (0..width * height).map(|at| self.window_side(at % width, at / width));
-        eigenvalue_map(self.points, sides.max().unwrap_or(0) as usize, window)
-    }
 }

@@ -38,6 +38,7 @@ mod methods;
 mod options;
 mod orientation;
 mod paper;
+mod plain;
 mod rect;
 mod simd;
 mod smoothing_area;

@@ -191,7 +191,7 @@ pub(crate) fn compute(
 }
 
 /// The sides of all pixels' windows, row by row, 0 for none.
-pub(crate) fn sides(
+fn sides(
     isa: Isa,
     points: &Points,
     options: &Options,

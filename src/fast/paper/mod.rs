@@ -7,6 +7,7 @@ mod choices;
 mod chosen;
 mod depth_changes;
 mod depths;
+mod engine;
 mod even_windows;
 mod integrals;
 mod layers;
@@ -19,6 +20,8 @@ mod windows;
 use std::iter::repeat_with;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
+
+pub(crate) use engine::FastEngine;
 
 use chosen::ChosenRow;
 use depths::{PointRows, room_for_columns, row_length};
@@ -122,11 +125,7 @@ pub(crate) fn compute(
 }
 
 /// Reads the depths, and finds the radii of all pixels' windows, row by row, 0 for none.
-pub(crate) fn radii(
-    job: &Job,
-    found: &mut Vec<f32>,
-    scratch: &mut super::Scratch,
-) -> Result<(), Error> {
+fn radii(job: &Job, found: &mut Vec<f32>, scratch: &mut super::Scratch) -> Result<(), Error> {
     let &Job { points, .. } = job;
     job.depths(scratch)?;
     job.radii(scratch)?;
@@ -181,7 +180,7 @@ pub(crate) fn write_chosen(
 
 /// The normals of the blocks whose middle pixel has a window of one of these radii; NaN for the others. The depths have
 /// been read.
-pub(crate) fn compute_of_blocks(
+fn compute_of_blocks(
     job: &Job,
     radii: &[u32],
     normals: &Normals,
@@ -224,7 +223,7 @@ pub(crate) fn read_cloud(
 }
 
 /// The depth changes of a cloud, as [`find_depth_changes`](crate::paper::find_depth_changes).
-pub(crate) fn find_depth_changes(
+fn find_depth_changes(
     job: &Job,
     changes: &mut DepthChanges,
     cloud: &Cloud,
@@ -241,7 +240,7 @@ pub(crate) fn find_depth_changes(
 }
 
 /// What CM finds along with even windows.
-pub(crate) struct WithEven<'a> {
+struct WithEven<'a> {
     /// The normals of the even windows, block by block.
     pub of_even: &'a Normals<'a>,
     /// In the paper's semantics those of the pixels that may take none; the others are not written.
@@ -249,7 +248,7 @@ pub(crate) struct WithEven<'a> {
 }
 
 /// Pixels' own normals.
-pub(crate) struct Own<'a> {
+struct Own<'a> {
     /// The pixels that are left out.
     pub concerned: &'a Marks,
     /// As [`compute`] has them.
@@ -259,7 +258,7 @@ pub(crate) struct Own<'a> {
 
 /// The even windows of all blocks, and what is to be found along with them; the job's method is CM. The depths have been
 /// read, and the pixels' own windows are those that [`radii`] has found. Afterwards there is room for [`choices`].
-pub(crate) fn even_windows(
+fn even_windows(
     job: &Job,
     (cloud, asked): (&Cloud, &Asked),
     windows: &mut Vec<EvenWindow>,
@@ -278,12 +277,7 @@ pub(crate) fn even_windows(
 }
 
 /// The block whose even window each pixel takes, where there is one; the others' choices stay.
-pub(crate) fn choices(
-    isa: Isa,
-    even: &EvenWindows,
-    choices: &mut [u32],
-    scratch: &mut super::Scratch,
-) {
+fn choices(isa: Isa, even: &EvenWindows, choices: &mut [u32], scratch: &mut super::Scratch) {
     let super::Scratch { workers, each, .. } = scratch;
     let rows = choices.chunks_mut(BLOCK * even.cloud.width).enumerate();
     workers.share(rows, |worker, rows| {

@@ -1,0 +1,151 @@
+//! The plain form: the specification that every fast path is held to.
+
+use crate::Error;
+use crate::cloud::Points;
+use crate::depth_change::depth_change_map;
+use crate::distance::distance_map;
+use crate::eigenvalues::eigenvalue_map;
+use crate::memory::{refill, table};
+use crate::methods::{Estimate, estimate_window, start};
+use crate::options::{Method, Options, Semantics};
+use crate::orientation::turn_to_viewpoint;
+use crate::paper::{
+    self, Asked, Blocks, Cloud, DepthChanges, EvenWindows, Marks, PaperMaps, Windows,
+};
+use crate::smoothing_area::window_side;
+use crate::threads::Workers;
+use crate::window::Image;
+
+/// The whole method with PCL's semantics.
+pub(crate) struct Plain<'a> {
+    points: &'a Points<'a>,
+    options: &'a Options,
+    image: Image,
+    pub depth_changes: Vec<bool>,
+    pub distances: Vec<f32>,
+}
+
+impl<'a> Plain<'a> {
+    pub fn new(points: &'a Points, options: &'a Options) -> Result<Self, Error> {
+        let (width, height) = (points.width(), points.height());
+        let depth_changes = depth_change_map(points, options.max_depth_change_factor)?;
+        let distances = distance_map(&depth_changes, width, height)?;
+        let image = Image { width, height, border_policy: options.border_policy };
+        Ok(Plain { points, options, image, depth_changes, distances })
+    }
+
+    /// The side of a pixel's window; 0 for none.
+    pub fn window_side(&self, x: usize, y: usize) -> u32 {
+        let Image { width, height, .. } = self.image;
+        let border = self.options.ignored_border();
+        let inside = |at: usize, size: usize| at >= border && at < size.saturating_sub(border);
+        if !(inside(x, width) && inside(y, height)) {
+            return 0;
+        }
+        window_side(self.distances[y * width + x], self.points.z(x, y), self.options)
+    }
+
+    pub fn estimate(&self, x: usize, y: usize) -> Estimate {
+        let side = self.window_side(x, y) as usize;
+        if side == 0 {
+            return Estimate::NONE;
+        }
+        let (points, image) = (self.points, &self.image);
+        let found = estimate_window(self.options.method, points, image, (x, y), (side, side));
+        turn_to_viewpoint(found, self.points.at(x, y), self.options.viewpoint)
+    }
+
+    /// The eigenvalues of the covariance matrices of all pixels' windows.
+    pub fn eigenvalue_map(&self) -> Result<Vec<[f32; 3]>, Error> {
+        let window = |x: usize, y: usize| {
+            let side = self.window_side(x, y) as usize;
+            let first = (start(x, side), start(y, side));
+            let rects = self.image.rects(first, (side, side));
+            (side > 0).then(|| rects.map(|(rect, _)| rect))
+        };
+        let Image { width, height, .. } = self.image;
+        let sides = (0..width * height).map(|at| self.window_side(at % width, at / width));
+        eigenvalue_map(self.points, sides.max().unwrap_or(0) as usize, window)
+    }
+}
+
+/// What the second pass builds on.
+pub(crate) struct PlainEngine<'a> {
+    pub points: &'a Points<'a>,
+    pub options: &'a Options,
+    pub workers: &'a Workers,
+}
+
+impl PlainEngine<'_> {
+    /// The pixels' own estimates, from windows of these sizes.
+    pub fn own(&self, sizes: &[f32]) -> Result<impl Fn(usize) -> Estimate + Sync, Error> {
+        let &PlainEngine { points, options, .. } = self;
+        let width = points.width();
+        let is_pcl = options.semantics == Semantics::Pcl;
+        let of_pcl = is_pcl.then(|| Plain::new(points, options)).transpose()?;
+        Ok(move |at: usize| {
+            let (x, y) = (at % width, at / width);
+            let of_paper = || paper::of_radius(points, options, (x, y), sizes[at] as u32);
+            of_pcl.as_ref().map_or_else(of_paper, |plain| plain.estimate(x, y))
+        })
+    }
+}
+
+impl paper::Engine for PlainEngine<'_> {
+    fn workers(&self) -> &Workers {
+        self.workers
+    }
+
+    fn sizes(&mut self, sizes: &mut Vec<f32>) -> Result<(), Error> {
+        let &mut PlainEngine { points, options, .. } = self;
+        let (width, height) = (points.width(), points.height());
+        match options.semantics {
+            Semantics::Pcl => {
+                let plain = Plain::new(points, options)?;
+                let side = |at: usize| plain.window_side(at % width, at / width) as f32;
+                refill(sizes, (0..width * height).map(side))
+            }
+            Semantics::Paper => {
+                let maps = PaperMaps::new(points, options)?;
+                refill(sizes, maps.smoothing_radii.iter().map(|radius| radius.trunc()))
+            }
+        }
+    }
+
+    fn find_depth_changes(&self, changes: &mut DepthChanges, cloud: &Cloud) -> Result<(), Error> {
+        paper::find_depth_changes(changes, cloud, self.options, self.workers)
+    }
+
+    fn even_windows(
+        &mut self,
+        cloud: &Cloud,
+        asked: &Asked,
+        _concerned: &Marks,
+        found: &mut Windows,
+    ) -> Result<(), Error> {
+        let Windows { even, of_even, .. } = found;
+        refill(even, paper::even_windows(cloud, asked))?;
+        if self.options.method == Method::CovarianceMatrix {
+            let radii = table(even.iter().map(|window| window.radius as u32))?;
+            self.of_blocks(&asked.blocks, &radii, of_even)?;
+        }
+        Ok(())
+    }
+
+    fn choices(&mut self, even: &EvenWindows, choices: &mut [u32]) {
+        even.choose(choices);
+    }
+
+    fn of_blocks(
+        &mut self,
+        blocks: &Blocks,
+        radii: &[u32],
+        estimates: &mut Vec<[f32; 4]>,
+    ) -> Result<(), Error> {
+        let &mut PlainEngine { points, options, .. } = self;
+        let of_block = |block: usize| {
+            paper::of_radius(points, options, blocks.middle(block), radii[block]).into()
+        };
+        refill(estimates, (0..blocks.count()).map(of_block))
+    }
+}
