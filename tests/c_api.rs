@@ -107,21 +107,11 @@ fn cpp_with_the_shared_library() {
     compile_and_run("cpp-shared", &CPP, shared);
 }
 
-/// Runs `tests/c_threads.c`.
-fn run_threads(which: &str) {
-    let directory = directory(which);
+#[test]
+fn threads_where_the_library_is_unloaded_or_the_process_forked() {
+    let directory = directory("threads");
     let program = compile("c_threads.c", &directory, &C99, |command, _| {
         command.args(["-ldl", "-lpthread"]);
     });
-    run(&program, &[library("libiine.so"), which.into()], &directory);
-}
-
-#[test]
-fn the_library_is_unloaded() {
-    run_threads("unloaded");
-}
-
-#[test]
-fn the_process_is_forked() {
-    run_threads("forked");
+    run(&program, &[library("libiine.so")], &directory);
 }

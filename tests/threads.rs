@@ -11,7 +11,7 @@ use clouds::{
     Cloud, Kind, Random, assert_same_bits, compute, compute_listed, compute_to, edge_options,
     fast_isas, methods, options, paper_options,
 };
-use iine::{BorderPolicy, DistanceMetric, Error, Estimator, Isa, Method, Options};
+use iine::{BorderPolicy, DistanceMetric, Error, Estimator, Isa, Method, Normals, Options};
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
@@ -126,6 +126,21 @@ fn listed_pixels_get_what_the_whole_cloud_gives_them() {
             }
         }
     }
+}
+
+#[test]
+fn an_empty_list_of_pixels_does_nothing() {
+    let cloud = Cloud::new(Kind::Plane, 9, 7, 0);
+    // Refused, if there is something to compute.
+    let options = options((Method::Simple3DGradient, BorderPolicy::Mirror), 10.0, false);
+    let mut estimator = Estimator::new(options);
+    let mut found = [7.0; 4];
+    let mut normals = Normals::interleaved(&mut found, 1, 1, 4, 0, Some(3)).unwrap();
+    let mut compute =
+        |indices: &[i32]| estimator.compute_indices(&cloud.view(), indices, &mut normals);
+    assert_eq!(compute(&[]), Ok(()));
+    assert_eq!(compute(&[0]), Err(Error::Unsupported));
+    assert_eq!(found, [7.0; 4]);
 }
 
 #[test]
