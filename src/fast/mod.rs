@@ -2,7 +2,7 @@
 //!
 //! First the windows of a slice of the image's rows (`windows`), then tile by tile, and if need be layer by layer
 //! (`layers`), the points (`planes`, `incomplete`), the method's rings of sums (`strip_pairs`, `strips`, `moments`,
-//! `half_windows`) and, run by run (`run`), the normals (`tile`). Slices are made of whole strips; strips, tiles and layers
+//! `half_windows`) and, run by run (`run`), the normals (`tile`, `one_point`). Slices are made of whole strips; strips, tiles and layers
 //! are fixed by the frame and the options, so that results do not depend on the number of threads.
 
 mod arithmetic;
@@ -15,6 +15,7 @@ mod incomplete;
 mod lanes;
 mod layers;
 mod moments;
+mod one_point;
 pub(crate) mod paper;
 mod paths;
 mod planes;

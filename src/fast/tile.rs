@@ -6,6 +6,7 @@ use std::ops::{Range, RangeInclusive};
 use super::arithmetic::{Floats, dot};
 use super::lanes::LANES;
 use super::layers::Layer;
+use super::one_point::of_one_point;
 use super::planes::{Frame, MARGIN, Planes, window_reach};
 use super::run::{Noted, RUN};
 use super::sink::Sink;
@@ -16,6 +17,7 @@ use crate::depth_change::is_depth_change;
 use crate::methods::{Estimate, estimate_window, start};
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
+use crate::rect::Rect;
 use crate::simd::{GROUP, Groups, Simd};
 use crate::window::Image;
 
@@ -468,13 +470,14 @@ impl Tile<'_> {
                 let at = number * LANES;
                 let sides = S::Pair::load(row.as_ptr().add(x));
                 let mut found = sums.estimate::<S::Pair>(of_run, at, sides, false);
-                let (mut doubtful, mut of_one_point) = (found.doubtful & lanes[number], 0);
+                let (mut doubtful, mut of_one) = (found.doubtful & lanes[number], 0);
+                let window = |lane: usize| ((x + lane, y), row[x + lane] as usize);
                 if doubtful != 0 {
-                    of_one_point = self.of_one_point(frame, planes, (x, y), doubtful);
-                    (windows, doubtful) = (windows & !of_one_point, doubtful & !of_one_point);
+                    let around = |lane: usize| (window(lane).0, self.around(window(lane)));
+                    of_one = of_one_point::<S::Widest>(self.points, doubtful, around);
+                    (windows, doubtful) = (windows & !of_one, doubtful & !of_one);
                 }
                 if doubtful != 0 {
-                    let window = |lane: usize| ((x + lane, y), row[x + lane] as usize);
                     let points = |lane: usize| self.points_in(window(lane));
                     let estimate = |run: &_| sums.estimate::<S::Pair>(run, at, sides, true);
                     let precisely = |lane: usize| sums.precisely(self, window(lane));
@@ -491,7 +494,7 @@ impl Tile<'_> {
                 let viewpoint = self.options.viewpoint;
                 let mut estimates = Estimates::of(found, point, viewpoint, windows & !plain);
                 let curvature = if M::CURVATURE { 0.0 } else { f32::NAN };
-                for lane in Bits(of_one_point) {
+                for lane in Bits(of_one) {
                     estimates.put(lane, Estimate { curvature, ..Estimate::NONE });
                 }
                 if plain != 0 {
@@ -502,36 +505,13 @@ impl Tile<'_> {
         }
     }
 
-    /// The lanes, of some of those that begin with pixel `(x, y)`, whose windows, and the pixels around them, hold the
-    /// same point again and again, as a sensor's zeros for "no return" are. They have no normal, and curvature 0.
-    #[cold]
-    fn of_one_point(
-        &self,
-        frame: &Frame,
-        planes: &Planes,
-        (x, y): (usize, usize),
-        lanes: u32,
-    ) -> u32 {
+    /// What a pixel's window and the pixels around it cover.
+    fn around(&self, ((x, y), side): ((usize, usize), usize)) -> Rect {
         let Image { width, height, .. } = *self.image;
-        let are_alike = |lanes: RangeInclusive<usize>, side: usize| {
-            let (before, after) = window_reach(side);
-            let (first, last) = (x + lanes.start(), x + lanes.end());
-            let columns = first.saturating_sub(before)..(last + after + 1).min(width);
-            let columns = frame.column(columns.start)..frame.column(columns.end);
-            let own = planes.rows(frame, y).map(|plane| plane[frame.column(first)].to_bits());
-            (y.saturating_sub(before)..(y + after + 1).min(height)).all(|y| {
-                let planes = planes.rows(frame, y).map(|plane| &plane[columns.clone()]);
-                let differ = |c: usize| planes[c].iter().map(move |at| at.to_bits() ^ own[c]);
-                (0..3).flat_map(differ).fold(0, |any, bits| any | bits) == 0
-            })
-        };
-        let side = |lane: usize| self.sides.row(y)[x + lane] as usize;
-        let (first, last) = (lanes.trailing_zeros(), u32::BITS - 1 - lanes.leading_zeros());
-        let largest = Bits(lanes).map(side).max().unwrap_or(0);
-        if are_alike(first as usize..=last as usize, largest) {
-            return lanes;
-        }
-        Bits(lanes).which(|lane| are_alike(lane..=lane, side(lane)))
+        let (before, after) = window_reach(side);
+        let reached =
+            |at: usize, size: usize| at.saturating_sub(before)..(at + after + 1).min(size);
+        Rect { x: reached(x, width), y: reached(y, height) }
     }
 
     /// The points of a pixel's window, all of which are finite.

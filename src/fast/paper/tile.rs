@@ -10,6 +10,7 @@ use super::rects::{Pixels, Rects, Rows};
 use crate::cloud::Points;
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::fast::lanes::LANES;
+use crate::fast::one_point::of_one_point;
 use crate::fast::run::{Noted, OfRun, RUN};
 use crate::fast::sink::Sink;
 use crate::fast::tile::{Bits, Estimates, all};
@@ -18,7 +19,7 @@ use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
 use crate::paper::{CleanPoints, Cleaned, Marks, marks_from, middle, plain_estimate, window};
 use crate::rect::Rect;
-use crate::simd::{Along, GROUP, Groups};
+use crate::simd::{GROUP, Groups};
 
 /// A rectangle of the image whose normals are computed together.
 #[derive(Clone)]
@@ -275,8 +276,9 @@ impl Tile<'_> {
                 let mut found = M::estimate::<S::Pair>(sums, at, error);
                 let mut plain = found.doubtful & windows;
                 if plain != 0 {
-                    let of_one_point = self.of_one_point::<S::Widest>(pixel, rect, plain);
-                    (windows, plain) = (windows & !of_one_point, plain & !of_one_point);
+                    let around = |lane: usize| (pixel(lane), rect(lane));
+                    let of_one = of_one_point::<S::Widest>(self.points, plain, around);
+                    (windows, plain) = (windows & !of_one, plain & !of_one);
                 }
                 if plain != 0 {
                     let points = |lane: usize| cleaned.finite(rect(lane));
@@ -292,64 +294,6 @@ impl Tile<'_> {
                 sink.write::<S::Pair>(place, written, &normals, &columns);
             }
         }
-    }
-
-    /// The lanes, of some, whose windows hold the same point again and again, as a sensor may write it for "no return": they
-    /// have no normal.
-    ///
-    /// # Safety
-    /// As [`Tile::compute`].
-    #[inline(always)]
-    unsafe fn of_one_point<S: Along>(
-        &self,
-        pixel: impl Fn(usize) -> (usize, usize),
-        rect: impl Fn(usize) -> Rect,
-        lanes: u32,
-    ) -> u32 {
-        let first = lanes.trailing_zeros() as usize;
-        let (x, y) = pixel(first);
-        let point = self.points.at(x, y);
-        let hull = |a: Range<usize>, b: Range<usize>| a.start.min(b.start)..a.end.max(b.end);
-        let all = Bits(lanes).map(&rect);
-        let all = all.fold(rect(first), |a, b| Rect { x: hull(a.x, b.x), y: hull(a.y, b.y) });
-        let mut alike = 0;
-        // SAFETY: as the caller's.
-        unsafe {
-            if self.holds_only::<S>(&all, point) {
-                return lanes;
-            }
-            for lane in Bits(lanes) {
-                alike |= u32::from(self.holds_only::<S>(&rect(lane), point)) << lane;
-            }
-        }
-        alike
-    }
-
-    /// Whether a rectangle holds this point only, and some that are NaN.
-    ///
-    /// # Safety
-    /// As [`Tile::compute`].
-    #[inline(always)]
-    unsafe fn holds_only<S: Along>(&self, rect: &Rect, point: [f32; 3]) -> bool {
-        let Rect { x: columns, y: rows } = rect;
-        for row in rows.clone() {
-            let row = self.points.row(row, columns.clone());
-            // SAFETY: as the caller's.
-            unsafe {
-                let [x, y, z] = [S::splat(point[0]), S::splat(point[1]), S::splat(point[2])];
-                let mut others = S::splat(0.0);
-                for at in row.starts::<S>() {
-                    let [px, py, pz] = row.lanes::<S>(at);
-                    let there = S::and(S::and(S::eq(px, px), S::eq(py, py)), S::eq(pz, pz));
-                    let alike = S::and(S::and(S::eq(px, x), S::eq(py, y)), S::eq(pz, z));
-                    others = S::or(others, S::and_not(alike, there));
-                }
-                if S::bits(others) != 0 {
-                    return false;
-                }
-            }
-        }
-        true
     }
 
     /// The plain form of one pixel.
