@@ -98,27 +98,28 @@ const LEAST_GAP: f64 = 1e5 * 4.0 * ROUNDING;
 const DOUBT_PLANE: f32 = 1e-5;
 
 impl Moments {
-    /// The moments of a group's windows, all of this side; `x` is its first pixel.
+    /// Finds the moments of a group's windows, all of this side; `x` is its first pixel.
     ///
     /// # Safety
     /// As [`Sums::note`].
     #[inline(always)]
-    unsafe fn of_side<S: Groups>(&self, frame: &Frame, x: usize, side: usize) -> WindowMoments<S> {
+    unsafe fn of_side<S: Groups>(&self, frame: &Frame, x: usize, side: usize, to: &mut Lanewise) {
         let column = frame.column(x);
         let place @ Place { above, below, share } = self.places[side];
         // SAFETY: as the caller's: rows and columns are held, and so is the group from this column on.
         unsafe {
-            let mut rows = [S::splat_d(0.0); GROUP];
             for lane in 0..GROUP {
-                rows[lane] = self.most_between::<S>(column + lane, &place, side);
+                let most = self.most_between::<S>(column + lane, &place, side);
+                S::store_d(to.most[lane].as_mut_ptr(), most);
             }
             let corners = [above, above.wrapping_add(side), below, below.wrapping_add(side)];
-            let z = sum_between(self.z.as_ptr().wrapping_add(column), &corners);
-            WindowMoments::of_rows(rows, z, Doubles::splat(share))
+            let z: Doubles<S> = sum_between(self.z.as_ptr().wrapping_add(column), &corners);
+            S::store_d(to.z.as_mut_ptr(), z.0);
+            S::store_d(to.share.as_mut_ptr(), S::splat_d(share));
         }
     }
 
-    /// The moments of the windows of some lanes of a pair, of the group that begins with lane `first`.
+    /// Finds the moments of the windows of some lanes of a pair, of the group that begins with lane `first`.
     ///
     /// # Safety
     /// As [`Sums::note`].
@@ -129,9 +130,9 @@ impl Moments {
         pair: &Pair,
         first: usize,
         lanes: u32,
-    ) -> Lanewise {
+        to: &mut Lanewise,
+    ) {
         let column = frame.column(pair.x + first);
-        let mut moments = Lanewise::default();
         // SAFETY: as the caller's: no window of the row aimed at is larger, and rows and columns are held.
         unsafe {
             let sides = pair.sides::<S>(first, lanes);
@@ -139,15 +140,14 @@ impl Moments {
                 let (column, side) = (column + lane, sides[lane] as usize);
                 let place = self.places.get_unchecked(side);
                 let most = self.most_between::<S>(column, place, side);
-                S::store_d(moments.most[lane].as_mut_ptr(), most);
+                S::store_d(to.most[lane].as_mut_ptr(), most);
                 let z = self.z.as_ptr().wrapping_add(column);
                 let difference =
                     |left: usize| *z.wrapping_add(left.wrapping_add(side)) - *z.wrapping_add(left);
-                moments.z[lane] = difference(place.below) - difference(place.above);
-                moments.share[lane] = place.share;
+                to.z[lane] = difference(place.below) - difference(place.above);
+                to.share[lane] = place.share;
             }
         }
-        moments
     }
 
     /// The sums of most moments of the window of the pixel in this column.
@@ -232,25 +232,10 @@ impl Lanewise {
             for lane in 0..GROUP {
                 rows[lane] = S::load_d(self.most[lane].as_ptr());
             }
+            let [xx, xy, xz, yy, yz, zz, x, y] = S::transpose_d(rows).map(Doubles);
             let [z, share] = [&self.z, &self.share].map(|from| Doubles(S::load_d(from.as_ptr())));
-            WindowMoments::of_rows(rows, z, share)
+            WindowMoments { sums: [x, y, z, xx, xy, xz, yy, yz, zz], share }
         }
-    }
-}
-
-impl<S: Groups> WindowMoments<S> {
-    /// From most moments, window by window, and z.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    unsafe fn of_rows(rows: [S::D; GROUP], z: Doubles<S>, share: Doubles<S>) -> Self {
-        // SAFETY: as the caller's.
-        let [xx, xy, xz, yy, yz, zz, x, y] = unsafe { S::transpose_d(rows) };
-        let (x, y) = (Doubles(x), Doubles(y));
-        let (xx, xy, xz) = (Doubles(xx), Doubles(xy), Doubles(xz));
-        let (yy, yz, zz) = (Doubles(yy), Doubles(yz), Doubles(zz));
-        WindowMoments { sums: [x, y, z, xx, xy, xz, yy, yz, zz], share }
     }
 }
 
@@ -354,7 +339,8 @@ impl Sums for Moments {
     ) -> u32 {
         let all_inside = tile.inside(pair);
         let mut plain = 0;
-        for first in (0..LANES).step_by(GROUP) {
+        for group in 0..LANES / GROUP {
+            let (first, to) = (group * GROUP, &mut run.windows[group]);
             let [lanes, inside] =
                 [pair.windows, all_inside].map(|lanes| lanes >> first & all(GROUP));
             if lanes == 0 {
@@ -362,21 +348,19 @@ impl Sums for Moments {
             }
             // SAFETY: as the caller's.
             unsafe {
-                let moments = if let Some(side) = pair.one_side::<S>(first, lanes) {
-                    self.of_side::<S>(frame, pair.x + first, side)
-                } else {
-                    let mut moments = self.of_lanes::<S>(frame, pair, first, inside);
-                    let crossing = lanes & !inside;
-                    if crossing != 0 {
-                        let left =
-                            self.put_crossing(tile, frame, pair, first, crossing, &mut moments);
-                        plain |= left << first;
-                    }
-                    moments.load::<S>()
-                };
-                run.note(&moments, at + first);
+                if let Some(side) = pair.one_side::<S>(first, lanes) {
+                    self.of_side::<S>(frame, pair.x + first, side, to);
+                    continue;
+                }
+                self.of_lanes::<S>(frame, pair, first, inside, to);
+            }
+            let crossing = lanes & !inside;
+            if crossing != 0 {
+                plain |= self.put_crossing(tile, frame, pair, first, crossing, to) << first;
             }
         }
+        // SAFETY: as the caller's.
+        unsafe { run.note_windows::<S>(pair.windows, at) };
         plain
     }
 
@@ -396,6 +380,8 @@ impl Sums for Moments {
 /// The covariance matrices of a run's windows (Eq. 25), over their traces, and the smallest eigenvalues.
 #[derive(Default)]
 pub(crate) struct Matrices {
+    /// Of a pair of groups: their sums do not wait for what the first group's become.
+    windows: [Lanewise; LANES / GROUP],
     /// xx, xy, xz, yy, yz, zz
     elements: OfRun<f64, 6>,
     trace: OfRun<f32, 1>,
@@ -470,6 +456,21 @@ impl Noted for Matrices {
 }
 
 impl Matrices {
+    /// Notes the windows of some lanes of the pair of groups that is `at`.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`; the pixels are in the run.
+    #[inline(always)]
+    unsafe fn note_windows<S: Groups>(&mut self, lanes: u32, at: usize) {
+        for group in 0..LANES / GROUP {
+            let first = group * GROUP;
+            if lanes >> first & all(GROUP) != 0 {
+                // SAFETY: as the caller's.
+                unsafe { self.note(&self.windows[group].load::<S>(), at + first) };
+            }
+        }
+    }
+
     /// The matrices of windows with these moments, for the pixels from `at` on, and their polynomials.
     ///
     /// # Safety
