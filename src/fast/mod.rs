@@ -370,10 +370,34 @@ impl Job<'_> {
                 layers: &layers[..count],
                 sides: windows.sides(width),
             };
-            // SAFETY: the processor has the instruction set of the job, and tiles do not share pixels.
-            unsafe { paths::run(self.isa, TileTask { tile, scale, scratch, sink }) };
+            let TileScratch { frame, planes, moments, strip_pairs, strips, .. } = scratch;
+            let TileScratch { half_windows, integer_half_windows, .. } = scratch;
+            match (options.method, scale) {
+                (Method::CovarianceMatrix, _) => self.tile(tile, frame, planes, moments, sink),
+                (Method::Average3DGradient, _) => self.tile(tile, frame, planes, strip_pairs, sink),
+                (Method::AverageDepthChange, Some(scale)) => {
+                    self.tile(tile, frame, planes, integer_half_windows.scaled(scale), sink);
+                }
+                (Method::AverageDepthChange, None) => {
+                    self.tile(tile, frame, planes, half_windows.scaled(1.0), sink);
+                }
+                (Method::Simple3DGradient, _) => self.tile(tile, frame, planes, strips, sink),
+            }
         }
         Ok(reach)
+    }
+
+    /// The normals of one tile.
+    fn tile<M: Sums>(
+        &self,
+        tile: &Tile,
+        frame: &mut Frame,
+        planes: &mut Planes,
+        sums: &mut M,
+        sink: &Sink,
+    ) {
+        // SAFETY: the processor has the instruction set of the job, and tiles do not share pixels.
+        unsafe { paths::run(self.isa, TileTask { tile, frame, planes, sums, sink }) };
     }
 
     /// How many times as deep as the nearest points others may be for the method's sums, of integers or not, to be fine
@@ -423,36 +447,21 @@ impl Task for SweepTask<'_> {
 }
 
 /// One tile, with the sums of its method; no one else writes the tile's pixels.
-struct TileTask<'a> {
+struct TileTask<'a, M> {
     tile: &'a Tile<'a>,
-    /// What depths are multiplied by to become integers, where these are fine enough for [`HalfWindows`].
-    scale: Option<f32>,
-    scratch: &'a mut TileScratch,
+    frame: &'a mut Frame,
+    planes: &'a mut Planes,
+    sums: &'a mut M,
     sink: &'a Sink<'a>,
 }
 
-impl Task for TileTask<'_> {
+impl<M: Sums> Task for TileTask<'_, M> {
     type Output = ();
 
     #[inline(always)]
     unsafe fn run<S: Groups>(self) {
-        let TileTask { tile, scale, scratch, sink } = self;
-        let TileScratch { frame, planes, moments, strip_pairs, strips, .. } = scratch;
-        let TileScratch { half_windows, integer_half_windows, .. } = scratch;
+        let TileTask { tile, frame, planes, sums, sink } = self;
         // SAFETY: as the caller's.
-        unsafe {
-            match tile.options.method {
-                Method::CovarianceMatrix => tile.compute::<S, _>(frame, planes, moments, sink),
-                Method::Average3DGradient => tile.compute::<S, _>(frame, planes, strip_pairs, sink),
-                Method::AverageDepthChange => match scale {
-                    Some(scale) => {
-                        let sums = integer_half_windows.scaled(scale);
-                        tile.compute::<S, _>(frame, planes, sums, sink);
-                    }
-                    None => tile.compute::<S, _>(frame, planes, half_windows.scaled(1.0), sink),
-                },
-                Method::Simple3DGradient => tile.compute::<S, _>(frame, planes, strips, sink),
-            }
-        }
+        unsafe { tile.compute::<S, M>(frame, planes, sums, sink) };
     }
 }

@@ -228,7 +228,7 @@ impl Tile<'_> {
             loop {
                 // SAFETY: as the caller's.
                 let done = unsafe {
-                    self.rows::<S, M>(frame, planes, sums, sink, side, layer, origin, limit)
+                    self.rows::<S, M>(frame, planes, sums, sink, (layer, side), (origin, limit))
                 };
                 let Err(BeyondLimit) = done else { break };
                 // SAFETY: as the caller's.
@@ -308,19 +308,16 @@ impl Tile<'_> {
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
     unsafe fn rows<S: Groups, M: Sums>(
         &self,
         frame: &Frame,
         planes: &mut Planes,
         sums: &mut M,
         sink: &Sink,
-        side: usize,
-        layer: &Layer,
-        origin: [f32; 3],
-        limit: f32,
+        (layer, side): (&Layer, usize),
+        (origin, limit): ([f32; 3], f32),
     ) -> Result<(), BeyondLimit> {
-        let (points, held) = (self.points, layer.held);
+        let held = layer.held;
         let mut run = Run::default();
         let (before, after) = window_reach(side);
         let mut next = frame.rows.start;
@@ -329,7 +326,7 @@ impl Tile<'_> {
             while next < (y + after + 1).min(self.image.height) {
                 // SAFETY: as the caller's.
                 let largest =
-                    unsafe { planes.push::<S::Widest>(points, frame, next, held, origin) };
+                    unsafe { planes.push::<S::Widest>(self.points, frame, next, held, origin) };
                 if largest > limit {
                     return Err(BeyondLimit);
                 }
@@ -338,12 +335,11 @@ impl Tile<'_> {
                 next += 1;
             }
             sums.aim(frame, y, side);
-            let inner = self.inner(side, y);
             let incomplete = planes.incomplete.aim(frame, y, before);
+            let inner = self.inner(side, y);
+            let row = Row { tile: self, layer, y, frame, planes, sums, sink };
             // SAFETY: as the caller's.
-            unsafe {
-                self.row::<S, M>(frame, planes, sums, sink, &mut run, y, &inner, layer, incomplete);
-            }
+            unsafe { row.compute::<S>(&mut run, &inner, incomplete) };
         }
         Ok(())
     }
@@ -390,119 +386,6 @@ impl Tile<'_> {
     #[cold]
     fn of_layer(&self, layer: &Layer, (x, y): (usize, usize), lanes: u32) -> u32 {
         Bits(lanes).which(|lane| layer.has(self.points.z(x + lane, y)))
-    }
-
-    /// # Safety
-    /// As [`Tile::compute`].
-    #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
-    unsafe fn row<S: Groups, M: Sums>(
-        &self,
-        frame: &Frame,
-        planes: &Planes,
-        sums: &M,
-        sink: &Sink,
-        run: &mut Run<M>,
-        y: usize,
-        inner: &Range<usize>,
-        layer: &Layer,
-        incomplete: bool,
-    ) {
-        let row = self.sides.row(y);
-        for start in self.columns.clone().step_by(RUN) {
-            run.length = 0;
-            for x in (start..self.columns.end.min(start + RUN)).step_by(LANES) {
-                // SAFETY: as the caller's; a row of sides is readable up to a whole pair of groups.
-                unsafe {
-                    let mut pair = Pair::new::<S>(self, row, x, y, inner);
-                    let mut written = all((self.columns.end - x).min(LANES));
-                    if !layer.is_all() {
-                        pair.windows = self.of_layer(layer, (x, y), pair.windows);
-                        written = pair.windows;
-                    }
-                    let windows = pair.windows;
-                    let mut plain = 0;
-                    if incomplete {
-                        plain = planes.incomplete.in_windows(frame, &pair);
-                        pair.windows &= !plain;
-                    }
-                    if windows == 0 {
-                        self.write::<S>(sink, (x, y), written, &Estimates::NONE);
-                        continue;
-                    }
-                    let at = run.length * LANES;
-                    if pair.windows != 0 {
-                        plain |= sums.note::<S>(self, frame, planes, &pair, &mut run.sums, at);
-                    }
-                    run.places[run.length] = (x, windows, written);
-                    run.lanes[run.length] = windows & !plain;
-                    run.length += 1;
-                }
-            }
-            // SAFETY: as the caller's.
-            unsafe { self.finish::<S, M>(frame, planes, sums, sink, run, y) };
-        }
-    }
-
-    /// Writes the normals of a run in row `y`.
-    ///
-    /// # Safety
-    /// As [`Tile::compute`].
-    #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
-    unsafe fn finish<S: Groups, M: Sums>(
-        &self,
-        frame: &Frame,
-        planes: &Planes,
-        sums: &M,
-        sink: &Sink,
-        run: &mut Run<M>,
-        y: usize,
-    ) {
-        let row = self.sides.row(y);
-        let planes_row = planes.rows(frame, y);
-        let Run { sums: of_run, places, lanes, length } = run;
-        // SAFETY: as the caller's; the rows are readable up to a whole pair of groups.
-        unsafe {
-            of_run.solve::<S>(0, &lanes[..*length]);
-            for number in 0..*length {
-                let (x, mut windows, written) = places[number];
-                let at = number * LANES;
-                let sides = S::Pair::load(row.as_ptr().add(x));
-                let mut found = sums.estimate::<S::Pair>(of_run, at, sides, false);
-                let (mut doubtful, mut of_one) = (found.doubtful & lanes[number], 0);
-                let window = |lane: usize| ((x + lane, y), row[x + lane] as usize);
-                if doubtful != 0 {
-                    let around = |lane: usize| (window(lane).0, self.around(window(lane)));
-                    of_one = of_one_point::<S::Widest>(self.points, doubtful, around);
-                    (windows, doubtful) = (windows & !of_one, doubtful & !of_one);
-                }
-                if doubtful != 0 {
-                    let points = |lane: usize| self.points_in(window(lane));
-                    let estimate = |run: &_| sums.estimate::<S::Pair>(run, at, sides, true);
-                    let precisely = |lane: usize| sums.precisely(self, window(lane));
-                    doubtful =
-                        found.settle::<S, _, _>(doubtful, of_run, at, points, estimate, precisely);
-                }
-                let plain = windows & !lanes[number] | doubtful;
-                let column = frame.column(x);
-                let point = [
-                    Floats::load(planes_row[0].as_ptr().add(column)),
-                    Floats::load(planes_row[1].as_ptr().add(column)),
-                    Floats::load(planes_row[2].as_ptr().add(column)),
-                ];
-                let viewpoint = self.options.viewpoint;
-                let mut estimates = Estimates::of(found, point, viewpoint, windows & !plain);
-                let curvature = if M::CURVATURE { 0.0 } else { f32::NAN };
-                for lane in Bits(of_one) {
-                    estimates.put(lane, Estimate { curvature, ..Estimate::NONE });
-                }
-                if plain != 0 {
-                    self.plain_lanes(&mut estimates, (x, y), plain);
-                }
-                self.write::<S>(sink, (x, y), written, &estimates);
-            }
-        }
     }
 
     /// What a pixel's window and the pixels around it cover.
@@ -582,6 +465,123 @@ impl Tile<'_> {
         [(x - 1, y), (x, y - 1)].into_iter().any(|(x, y)| {
             is_depth_change(self.points.z(x, y), last, self.options.max_depth_change_factor)
         })
+    }
+}
+
+/// A row of a layer of a tile, that the sums are aimed at.
+struct Row<'a, M: Sums> {
+    tile: &'a Tile<'a>,
+    layer: &'a Layer,
+    y: usize,
+    frame: &'a Frame,
+    planes: &'a Planes,
+    sums: &'a M,
+    sink: &'a Sink<'a>,
+}
+
+impl<M: Sums> Clone for Row<'_, M> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<M: Sums> Copy for Row<'_, M> {}
+
+impl<M: Sums> Row<'_, M> {
+    /// Computes the row that the sums are aimed at. Whether windows may hold incomplete points, `incomplete` tells.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn compute<S: Groups>(self, run: &mut Run<M>, inner: &Range<usize>, incomplete: bool) {
+        let Row { tile, layer, y, frame, planes, sums, sink } = self;
+        let row = tile.sides.row(y);
+        for start in tile.columns.clone().step_by(RUN) {
+            run.length = 0;
+            for x in (start..tile.columns.end.min(start + RUN)).step_by(LANES) {
+                // SAFETY: as the caller's; a row of sides is readable up to a whole pair of groups.
+                unsafe {
+                    let mut pair = Pair::new::<S>(tile, row, x, y, inner);
+                    let mut written = all((tile.columns.end - x).min(LANES));
+                    if !layer.is_all() {
+                        pair.windows = tile.of_layer(layer, (x, y), pair.windows);
+                        written = pair.windows;
+                    }
+                    let windows = pair.windows;
+                    let mut plain = 0;
+                    if incomplete {
+                        plain = planes.incomplete.in_windows(frame, &pair);
+                        pair.windows &= !plain;
+                    }
+                    if windows == 0 {
+                        tile.write::<S>(sink, (x, y), written, &Estimates::NONE);
+                        continue;
+                    }
+                    let at = run.length * LANES;
+                    if pair.windows != 0 {
+                        plain |= sums.note::<S>(tile, frame, planes, &pair, &mut run.sums, at);
+                    }
+                    run.places[run.length] = (x, windows, written);
+                    run.lanes[run.length] = windows & !plain;
+                    run.length += 1;
+                }
+            }
+            // SAFETY: as the caller's.
+            unsafe { self.finish::<S>(run) };
+        }
+    }
+
+    /// Writes the normals of a run.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn finish<S: Groups>(self, run: &mut Run<M>) {
+        let Row { tile, y, frame, sums, sink, .. } = self;
+        let planes = self.planes.rows(frame, y);
+        let row = tile.sides.row(y);
+        let viewpoint = tile.options.viewpoint;
+        let Run { sums: of_run, places, lanes, length } = run;
+        // SAFETY: as the caller's; the rows are readable up to a whole pair of groups.
+        unsafe {
+            of_run.solve::<S>(0, &lanes[..*length]);
+            for number in 0..*length {
+                let (x, mut windows, written) = places[number];
+                let at = number * LANES;
+                let sides = S::Pair::load(row.as_ptr().add(x));
+                let mut found = sums.estimate::<S::Pair>(of_run, at, sides, false);
+                let (mut doubtful, mut of_one) = (found.doubtful & lanes[number], 0);
+                let window = |lane: usize| ((x + lane, y), row[x + lane] as usize);
+                if doubtful != 0 {
+                    let around = |lane: usize| (window(lane).0, tile.around(window(lane)));
+                    of_one = of_one_point::<S::Widest>(tile.points, doubtful, around);
+                    (windows, doubtful) = (windows & !of_one, doubtful & !of_one);
+                }
+                if doubtful != 0 {
+                    let points = |lane: usize| tile.points_in(window(lane));
+                    let estimate = |run: &_| sums.estimate::<S::Pair>(run, at, sides, true);
+                    let precisely = |lane: usize| sums.precisely(tile, window(lane));
+                    doubtful =
+                        found.settle::<S, _, _>(doubtful, of_run, at, points, estimate, precisely);
+                }
+                let plain = windows & !lanes[number] | doubtful;
+                let column = frame.column(x);
+                let point = [
+                    Floats::load(planes[0].as_ptr().add(column)),
+                    Floats::load(planes[1].as_ptr().add(column)),
+                    Floats::load(planes[2].as_ptr().add(column)),
+                ];
+                let mut estimates = Estimates::of(found, point, viewpoint, windows & !plain);
+                let curvature = if M::CURVATURE { 0.0 } else { f32::NAN };
+                for lane in Bits(of_one) {
+                    estimates.put(lane, Estimate { curvature, ..Estimate::NONE });
+                }
+                if plain != 0 {
+                    tile.plain_lanes(&mut estimates, (x, y), plain);
+                }
+                tile.write::<S>(sink, (x, y), written, &estimates);
+            }
+        }
     }
 }
 

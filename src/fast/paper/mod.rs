@@ -28,7 +28,7 @@ use depths::{PointRows, room_for_columns, row_length};
 use even_windows::{Even, EvenTile};
 use integrals::{Rings, elements_of_rings, presence_of_rings, reached, rows_of_rings};
 use layers::{Layer, Waiting};
-use methods::{CovarianceMatrix, Gradients, MOMENTS, SmoothedDepthChanges};
+use methods::{CovarianceMatrix, Gradients, MOMENTS, SmoothedDepthChanges, Sums};
 use tile::Tile;
 use windows::{Rows, Sweep, reach};
 
@@ -517,19 +517,45 @@ impl Job<'_> {
             let Some((columns, rows)) = grid.tile(item) else { return };
             let tile = Tile { points, options, columns, rows, largest, step, row, left_out };
             let scratch = &mut lock(&each[worker]).paper;
-            each_layer(&tile, &paper.ranges, span(options.method), |layer| {
-                let (tile, sink) = (&tile, &sink);
-                // SAFETY: the processor has the instruction set, and tiles do not share pixels.
-                unsafe {
-                    if layer.is_partial() {
-                        paths::run(self.isa, TileTask::<true> { tile, layer, scratch, sink })
-                    } else {
-                        paths::run(self.isa, TileTask::<false> { tile, layer, scratch, sink })
-                    }
+            let (tile, sink) = (&tile, &sink);
+            let WorkerScratch { moments, gradients, depth_changes, waiting, .. } = scratch;
+            each_layer(tile, &paper.ranges, span(options.method), |layer| match options.method {
+                Method::CovarianceMatrix => {
+                    let method = CovarianceMatrix::about(layer.origin);
+                    self.layer(method, tile, layer, moments, waiting, sink)
+                }
+                Method::AverageDepthChange => {
+                    self.layer(SmoothedDepthChanges, tile, layer, depth_changes, waiting, sink)
+                }
+                // The paper has no SIMPLE_3D_GRADIENT: second passes on PCL's semantics take this instead.
+                Method::Average3DGradient | Method::Simple3DGradient => {
+                    self.layer(Gradients, tile, layer, gradients, waiting, sink)
                 }
             });
         });
         Ok(())
+    }
+
+    /// A layer of one tile, as [`Tile::compute`].
+    fn layer<M: Sums<N>, const N: usize>(
+        &self,
+        method: M,
+        tile: &Tile,
+        layer: &Layer,
+        rings: &mut Rings<N>,
+        waiting: &mut Waiting,
+        sink: &Sink,
+    ) -> Option<f32> {
+        // SAFETY: the processor has the instruction set, and tiles do not share pixels.
+        unsafe {
+            if layer.is_partial() {
+                let task = TileTask::<_, N, true> { method, tile, layer, rings, waiting, sink };
+                paths::run(self.isa, task)
+            } else {
+                let task = TileTask::<_, N, false> { method, tile, layer, rings, waiting, sink };
+                paths::run(self.isa, task)
+            }
+        }
     }
 
     /// The even windows, and normals by CM, tile by tile; the even windows' radii are not above `largest`.
@@ -670,37 +696,23 @@ impl Task for SweepTask<'_> {
 
 /// A layer of one tile; no one else writes its pixels. Gives how deep the nearest point is that pixels wait for. `PARTIAL`
 /// tells whether the layer is one of several: apart, as it would cost other tiles some percents.
-struct TileTask<'a, 't, const PARTIAL: bool> {
+struct TileTask<'a, 't, M, const N: usize, const PARTIAL: bool> {
+    method: M,
     tile: &'t Tile<'a>,
     layer: &'t Layer,
-    scratch: &'t mut WorkerScratch,
+    rings: &'t mut Rings<N>,
+    waiting: &'t mut Waiting,
     sink: &'t Sink<'t>,
 }
 
-impl<const PARTIAL: bool> Task for TileTask<'_, '_, PARTIAL> {
+impl<M: Sums<N>, const N: usize, const PARTIAL: bool> Task for TileTask<'_, '_, M, N, PARTIAL> {
     type Output = Option<f32>;
 
     #[inline(always)]
     unsafe fn run<S: Groups>(self) -> Option<f32> {
-        let TileTask { tile, layer, scratch, sink } = self;
-        let WorkerScratch { moments, gradients, depth_changes, waiting, .. } = scratch;
+        let TileTask { method, tile, layer, rings, waiting, sink } = self;
         // SAFETY: as the caller's.
-        unsafe {
-            match tile.options.method {
-                Method::CovarianceMatrix => {
-                    let method = CovarianceMatrix::about(layer.origin);
-                    tile.compute::<S, _, MOMENTS, PARTIAL>(&method, moments, layer, waiting, sink)
-                }
-                Method::AverageDepthChange => {
-                    let method = SmoothedDepthChanges;
-                    tile.compute::<S, _, 4, PARTIAL>(&method, depth_changes, layer, waiting, sink)
-                }
-                // The paper has no SIMPLE_3D_GRADIENT: second passes on PCL's semantics take this instead.
-                Method::Average3DGradient | Method::Simple3DGradient => {
-                    tile.compute::<S, _, 8, PARTIAL>(&Gradients, gradients, layer, waiting, sink)
-                }
-            }
-        }
+        unsafe { tile.compute::<S, M, N, PARTIAL>(&method, rings, layer, waiting, sink) }
     }
 }
 
