@@ -2,8 +2,8 @@
 //!
 //! First the windows of a slice of the image's rows (`windows`), then tile by tile, and if need be layer by layer
 //! (`layers`), the points (`planes`, `incomplete`), the method's rings of sums (`strip_pairs`, `strips`, `moments`,
-//! `half_windows`) and, run by run (`run`), the normals (`tile`, `one_point`). Slices are made of whole strips; strips, tiles and layers
-//! are fixed by the frame and the options, so that results do not depend on the number of threads.
+//! `half_windows`) and, run by run (`run`), the normals (`tile`, `one_point`). Slices are made of whole strips; strips,
+//! tiles and layers are fixed by the frame and the options, so that results do not depend on the number of threads.
 
 mod arithmetic;
 mod buffer;

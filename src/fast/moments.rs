@@ -380,7 +380,7 @@ impl Sums for Moments {
 /// The covariance matrices of a run's windows (Eq. 25), over their traces, and the smallest eigenvalues.
 #[derive(Default)]
 pub(crate) struct Matrices {
-    /// Of a pair of groups: their sums do not wait for what the first group's become.
+    /// Those of a pair of groups: the second one's sums do not wait for what becomes of the first one's.
     windows: [Lanewise; LANES / GROUP],
     /// xx, xy, xz, yy, yz, zz
     elements: OfRun<f64, 6>,
