@@ -520,15 +520,15 @@ impl<'a> Normals<'a> {
     }
 }
 
-/// Asks for the cache lines of so many points, which are `step` bytes apart: of points larger than a line, for those that
-/// they start in.
+/// Asks for the cache lines of so many points or normals, which are `step` bytes apart: of those larger than a line, for the
+/// lines that they start in. To the second-level cache, as more of them can be on their way there at a time.
 #[inline(always)]
 pub(crate) fn prefetch(first: *const f32, count: usize, step: usize) {
     #[cfg(target_arch = "x86_64")]
     {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        use std::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
         // SAFETY: a prefetch reads and writes nothing, whatever the address.
-        let ask = |at| unsafe { _mm_prefetch::<_MM_HINT_T0>(first.wrapping_byte_add(at).cast()) };
+        let ask = |at| unsafe { _mm_prefetch::<_MM_HINT_T1>(first.wrapping_byte_add(at).cast()) };
         if step == LINE / 4 {
             // As below, but without a loop where the count is known.
             (0..count.div_ceil(4)).for_each(|line| ask(line * LINE));
@@ -544,23 +544,9 @@ pub(crate) fn prefetch(first: *const f32, count: usize, step: usize) {
     let _ = (first, count, step);
 }
 
-/// Asks for the cache lines of so many pixels, which will be written: normals are so far apart that stores would wait for
-/// their lines one by one.
-#[inline(always)]
-fn prefetch_for_writing(at: *mut f32, lanes: usize, point_stride: usize) {
-    #[cfg(target_arch = "x86_64")]
-    for lane in (0..lanes).step_by(2) {
-        use std::arch::x86_64::{_MM_HINT_ET0, _mm_prefetch};
-        // SAFETY: a prefetch reads and writes nothing, whatever the address.
-        unsafe { _mm_prefetch::<_MM_HINT_ET0>(at.wrapping_byte_add(lane * point_stride).cast()) };
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = (at, lanes, point_stride);
-}
-
-/// How far ahead lines are asked for; found by trying 48 to 512 on 640x480, where more gains, and 1280x960, where it does
-/// not, with caches that hold nothing of the frame.
-const PIXELS_AHEAD: usize = 128;
+/// How far ahead lines are asked for, as normals are so far apart that stores would wait for them one by one; found by
+/// trying 64 to 256.
+const PIXELS_AHEAD: usize = 192;
 
 impl Normals<'_> {
     /// Writes as many pixels of a row as there are lanes: nx, ny, nz and the curvature. Asks for those that are written a few
@@ -579,15 +565,12 @@ impl Normals<'_> {
         let step = self.grid.point_stride;
         let nx = self.normal[0].wrapping_byte_add(self.grid.offset(x, y));
         let (mut column, mut ahead) = (x + PIXELS_AHEAD, PIXELS_AHEAD.wrapping_mul(step));
-        if column >= columns.end {
+        let to_next_row = self.grid.row_stride.wrapping_sub(columns.len().wrapping_mul(step));
+        while column >= columns.end {
             column -= columns.len();
-            let row = columns.len().wrapping_mul(step);
-            ahead = ahead.wrapping_add(self.grid.row_stride).wrapping_sub(row);
+            ahead = ahead.wrapping_add(to_next_row);
         }
-        // Those of narrow tiles are not so far ahead.
-        if column < columns.end {
-            prefetch_for_writing(nx.wrapping_byte_add(ahead), S::LANES, step);
-        }
+        prefetch(nx.wrapping_byte_add(ahead), S::LANES, step);
         // SAFETY: as the caller's.
         unsafe {
             if let Some(place) = self.side_by_side {
