@@ -479,22 +479,14 @@ struct Row<'a, M: Sums> {
     sink: &'a Sink<'a>,
 }
 
-impl<M: Sums> Clone for Row<'_, M> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<M: Sums> Copy for Row<'_, M> {}
-
 impl<M: Sums> Row<'_, M> {
     /// Computes the row that the sums are aimed at. Whether windows may hold incomplete points, `incomplete` tells.
     ///
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn compute<S: Groups>(self, run: &mut Run<M>, inner: &Range<usize>, incomplete: bool) {
-        let Row { tile, layer, y, frame, planes, sums, sink } = self;
+    unsafe fn compute<S: Groups>(&self, run: &mut Run<M>, inner: &Range<usize>, incomplete: bool) {
+        let &Row { tile, layer, y, frame, planes, sums, sink } = self;
         let row = tile.sides.row(y);
         for start in tile.columns.clone().step_by(RUN) {
             run.length = 0;
@@ -536,8 +528,8 @@ impl<M: Sums> Row<'_, M> {
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn finish<S: Groups>(self, run: &mut Run<M>) {
-        let Row { tile, y, frame, sums, sink, .. } = self;
+    unsafe fn finish<S: Groups>(&self, run: &mut Run<M>) {
+        let &Row { tile, y, frame, sums, sink, .. } = self;
         let planes = self.planes.rows(frame, y);
         let row = tile.sides.row(y);
         let viewpoint = tile.options.viewpoint;
