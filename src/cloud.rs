@@ -549,32 +549,29 @@ pub(crate) fn prefetch(first: *const f32, count: usize, step: usize) {
 const PIXELS_AHEAD: usize = 192;
 
 impl Normals<'_> {
-    /// Writes as many pixels of a row as there are lanes: nx, ny, nz and the curvature. Asks for those that are written a few
-    /// groups later, if it is these columns of one row after the other.
+    /// Asks for the cache lines of those that are written some pixels after the `count` from `(x, y)` on, if it is these
+    /// `columns` of one row after the other.
+    #[inline(always)]
+    pub(crate) fn prefetch(&self, (x, y): (usize, usize), count: usize, columns: &Range<usize>) {
+        let (mut x, mut y) = (x + PIXELS_AHEAD, y);
+        while x >= columns.end {
+            (x, y) = (x - columns.len(), y + 1);
+        }
+        let first = self.normal[0].wrapping_byte_add(self.grid.offset(x, y));
+        prefetch(first, count, self.grid.point_stride);
+    }
+
+    /// Writes as many pixels of a row as there are lanes: nx, ny, nz and the curvature.
     ///
     /// # Safety
     /// As [`Normals::write`], for the pixels from `x` on; the processor has the instruction set of `S`.
     #[inline(always)]
-    pub(crate) unsafe fn write_lanes<S: Simd>(
-        &self,
-        x: usize,
-        y: usize,
-        fields: [S::F; 4],
-        columns: &Range<usize>,
-    ) {
-        let step = self.grid.point_stride;
-        let nx = self.normal[0].wrapping_byte_add(self.grid.offset(x, y));
-        let (mut column, mut ahead) = (x + PIXELS_AHEAD, PIXELS_AHEAD.wrapping_mul(step));
-        let to_next_row = self.grid.row_stride.wrapping_sub(columns.len().wrapping_mul(step));
-        while column >= columns.end {
-            column -= columns.len();
-            ahead = ahead.wrapping_add(to_next_row);
-        }
-        prefetch(nx.wrapping_byte_add(ahead), S::LANES, step);
+    pub(crate) unsafe fn write_lanes<S: Simd>(&self, x: usize, y: usize, fields: [S::F; 4]) {
         // SAFETY: as the caller's.
         unsafe {
             if let Some(place) = self.side_by_side {
-                return S::store_points(fields, place, nx, step);
+                let nx = self.normal[0].byte_add(self.grid.offset(x, y));
+                return S::store_points(fields, place, nx, self.grid.point_stride);
             }
             let mut lanes = [[0.0; 2 * GROUP]; 4];
             for (to, field) in lanes.iter_mut().zip(fields) {

@@ -54,10 +54,13 @@ impl<'a> Sink<'a> {
         match self {
             // SAFETY: as the caller's.
             Sink::All(normals) => unsafe {
+                if lanes != 0 {
+                    normals.prefetch((x, y), LANES, columns);
+                }
                 if lanes == all(LANES) {
                     let (nx, ny) = (S::load(nx.as_ptr()), S::load(ny.as_ptr()));
                     let (nz, curvature) = (S::load(nz.as_ptr()), S::load(curvature.as_ptr()));
-                    normals.write_lanes::<S>(x, y, [nx, ny, nz, curvature], columns);
+                    normals.write_lanes::<S>(x, y, [nx, ny, nz, curvature]);
                 } else {
                     for lane in Bits(lanes) {
                         normals.write(x + lane, y, normal(lane), curvature[lane]);

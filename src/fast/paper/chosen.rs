@@ -88,6 +88,7 @@ impl ChosenRow<'_> {
     unsafe fn write_chosen<S: Along>(&self, x: usize, choices: &[u32], lanes: u32) {
         let &ChosenRow { cloud, options, second_pass, normals, y, .. } = self;
         let of_even = second_pass.of_even();
+        normals.prefetch((x, y), S::LANES, &(0..cloud.width));
         // SAFETY: as the caller's; an estimate is four floats, and so many points are there.
         unsafe {
             // Lanes without a window have any one's.
@@ -101,7 +102,7 @@ impl ChosenRow<'_> {
                 turned::<S>(normal, [Floats(px), Floats(py), Floats(pz)], options.viewpoint);
             let fields = [nx.0, ny.0, nz.0, curvature];
             if lanes.count_ones() as usize == S::LANES {
-                return normals.write_lanes::<S>(x, y, fields, &(0..cloud.width));
+                return normals.write_lanes::<S>(x, y, fields);
             }
             let mut found = [[0.0; LANES]; 4];
             for (to, field) in found.iter_mut().zip(fields) {
