@@ -179,7 +179,7 @@ impl Estimator {
             Semantics::Pcl => {
                 let (width, height) = (points.width(), points.height());
                 let cleaned = self.without_zeros(points)?;
-                let cleaned = cleaned.as_ref().map(|cleaned| packed(cleaned, width, height));
+                let cleaned = cleaned.as_ref().map(packed);
                 let border_policy = self.options.border_policy;
                 let image = Image { width, height, border_policy };
                 let points = cleaned.as_ref().unwrap_or(points);
@@ -188,8 +188,7 @@ impl Estimator {
             Semantics::Paper => paper::estimate_window(points, &self.options, (x, y), size),
         };
         let found = turn_to_viewpoint(found, points.at(x, y), self.options.viewpoint);
-        // SAFETY: `normal` has this one element, and no other thread is at work.
-        unsafe { normal.write(0, 0, found.normal, found.curvature) };
+        write(normal, None, 1, &Workers::default(), |_, _| Some(found));
         Ok(())
     }
 
@@ -218,7 +217,7 @@ impl Estimator {
             return Err(Error::Unsupported);
         }
         let cleaned = self.without_zeros(points)?;
-        let cleaned = cleaned.as_ref().map(|cleaned| packed(cleaned, width, height));
+        let cleaned = cleaned.as_ref().map(packed);
         let points = cleaned.as_ref().unwrap_or(points);
         let write = |map: &mut Option<&mut [f32]>, from: &[f32]| {
             if let Some(map) = map {
@@ -260,8 +259,8 @@ impl Estimator {
     }
 
     /// A copy of the points without zeros, where those are missing.
-    fn without_zeros(&self, points: &Points) -> Result<Option<Vec<[f32; 3]>>, Error> {
-        let cleaned = || Ok(Cloud::new(points, &self.options)?.points);
+    fn without_zeros(&self, points: &Points) -> Result<Option<Cloud>, Error> {
+        let cleaned = || Cloud::new(points, &self.options);
         self.options.zero_is_missing.then(cleaned).transpose()
     }
 
@@ -275,7 +274,7 @@ impl Estimator {
         let Estimator { options, scratch, cloud, second_pass, .. } = self;
         scratch.prepare(options.threads)?;
         cloud.read(points, options)?;
-        let points = &packed(&cloud.points, cloud.width, cloud.height);
+        let points = &packed(cloud);
         let workers = scratch.workers();
         let mut engine = PlainEngine { points, options, workers };
         second_pass.compute(cloud, options, &mut engine)?;
@@ -300,7 +299,7 @@ impl Estimator {
         scratch.prepare(options.threads)?;
         fast::paper::read_cloud(&job, cloud, scratch)?;
         // To all windows, a point that misses a coordinate is missing whole.
-        let points = &packed(&cloud.points, cloud.width, cloud.height).beside(normals);
+        let points = &packed(cloud).beside(normals);
         // But for zeros, which are left out now, this is as PCL.
         if !options.has_second_pass() {
             return fast::compute(isa, points, options, indices, normals, scratch);
@@ -384,8 +383,9 @@ fn write_around(
     }
 }
 
-/// A view of packed points, as many as the size says.
-fn packed(points: &[[f32; 3]], width: usize, height: usize) -> Points<'_> {
-    Points::interleaved(points.as_flattened(), width, height, 3, 0)
+/// A view of a cloud's points.
+fn packed(cloud: &Cloud) -> Points<'_> {
+    let Cloud { points, width, height, .. } = cloud;
+    Points::interleaved(points.as_flattened(), *width, *height, 3, 0)
         .expect("a packed copy of a valid cloud")
 }

@@ -155,16 +155,20 @@ impl PaperOptions {
 
     /// Refuses what is out of range.
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let positive = |number: f32| number.is_finite() && number > 0.0;
-        let in_range = positive(self.alpha)
-            && positive(self.beta)
-            && positive(self.gamma)
+        let in_range = is_positive(self.alpha)
+            && is_positive(self.beta)
+            && is_positive(self.gamma)
             && self.smallest_radius >= 1
             && self.smallest_radius <= self.least_depth_radius
             && self.least_depth_radius <= self.largest_radius
             && self.largest_radius <= 1000;
         if in_range { Ok(()) } else { Err(Error::OptionValue) }
     }
+}
+
+/// Finite and above 0.
+pub(crate) fn is_positive(number: f32) -> bool {
+    number.is_finite() && number > 0.0
 }
 
 /// The options of an [`Estimator`](crate::Estimator). Start from [`Options::default`], which is PCL's.
@@ -242,7 +246,7 @@ impl Options {
             // It asks for alpha and the largest radius.
             self.paper.check()?;
         }
-        if !(self.normal_smoothing_size.is_finite() && self.normal_smoothing_size > 0.0) {
+        if !is_positive(self.normal_smoothing_size) {
             return Err(Error::OptionValue);
         }
         if self.method == Method::Simple3DGradient && self.border_policy == BorderPolicy::Mirror {

@@ -2,6 +2,7 @@
 
 use super::boundary::{guard, reference_mut};
 use super::estimator::iine_estimator;
+use crate::options::is_positive;
 use crate::{BorderPolicy, Depth, DistanceMetric, Error, Method, Options, PaperOptions, Semantics};
 
 /// Changes one option, after `change` has said that its value is in range.
@@ -98,7 +99,7 @@ pub unsafe extern "C" fn iine_estimator_set_normal_smoothing_size(
     normal_smoothing_size: f32,
 ) -> i32 {
     let change = |options: &mut Options| {
-        if !(normal_smoothing_size.is_finite() && normal_smoothing_size > 0.0) {
+        if !is_positive(normal_smoothing_size) {
             return Err(Error::OptionValue);
         }
         options.normal_smoothing_size = normal_smoothing_size;

@@ -82,7 +82,7 @@ impl Lanes {
 }
 
 /// How a row of pixels lies in lane order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy)]
 pub(crate) struct LaneOrder {
     pub width: usize,
     /// Pixels in a segment, so elements in a row.

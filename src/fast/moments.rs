@@ -239,6 +239,32 @@ impl Lanewise {
     }
 }
 
+/// Adds eight pixels' channels, eight, to their row's sums and those of the row above; `carry` is the sum along the row.
+///
+/// # Safety
+/// The processor has the instruction set of `S`; the rows, above and own, have so many pixels.
+#[inline(always)]
+pub(crate) unsafe fn push_eight<S: Groups>(
+    values: [S::D; 8],
+    [above, own]: [*mut f64; 2],
+    carry: &mut S::D,
+) {
+    // SAFETY: as the caller's.
+    unsafe {
+        let pixels = S::transpose_d(values);
+        // What a pixel waits for is one addition a group: that to the carry.
+        let mut along = pixels[0];
+        for lane in 0..GROUP {
+            if lane > 0 {
+                along = S::add_d(along, pixels[lane]);
+            }
+            let sum = S::add_d(S::add_d(along, *carry), S::load_d(above.add(8 * lane)));
+            S::store_d(own.add(8 * lane), sum);
+        }
+        *carry = S::add_d(along, *carry);
+    }
+}
+
 impl Sums for Moments {
     type OfRun = Matrices;
 
@@ -285,7 +311,7 @@ impl Sums for Moments {
                     point[c] = S::sub_d(S::widen(S::load(planes[c].as_ptr().add(at))), origin);
                 }
                 let [px, py, pz] = point;
-                let pixels = S::transpose_d([
+                let of_points = [
                     S::mul_d(px, px),
                     S::mul_d(px, py),
                     S::mul_d(px, pz),
@@ -294,16 +320,9 @@ impl Sums for Moments {
                     S::mul_d(pz, pz),
                     px,
                     py,
-                ]);
-                // What a pixel waits for is one addition a group: that to the carry.
-                let mut along = S::splat_d(0.0);
-                for lane in 0..GROUP {
-                    along = if lane == 0 { pixels[0] } else { S::add_d(along, pixels[lane]) };
-                    let from = most.add(above + at + lane).cast();
-                    let sum = S::add_d(S::add_d(along, most_carry), S::load_d(from));
-                    S::store_d(most.add(own + at + lane).cast(), sum);
-                }
-                most_carry = S::add_d(along, most_carry);
+                ];
+                let rows = [most.add(above + at), most.add(own + at)].map(|row| row.cast());
+                push_eight::<S>(of_points, rows, &mut most_carry);
                 let along = S::running_sum_d(pz, &mut z_carry);
                 S::store_d(z.add(own + at), S::add_d(along, S::load_d(z.add(above + at))));
             }

@@ -371,11 +371,10 @@ impl Tile<'_> {
 
     /// A finite point of a layer near the tile's middle, if the layer has a window: sums about it lose less.
     fn origin(&self, layer: &Layer) -> Option<[f32; 3]> {
-        let [(left, right), (above, below)] = [&self.columns, &self.rows].map(halves);
-        for y in below.chain(above.rev()) {
+        for y in from_middle(&self.rows) {
             let has_window =
                 |x: &usize| self.sides.row(y)[*x] > 0.0 && layer.has(self.points.z(*x, y));
-            if let Some(x) = right.clone().chain(left.clone().rev()).find(has_window) {
+            if let Some(x) = from_middle(&self.columns).find(has_window) {
                 return Some(self.points.at(x, y).map(|c| if c.is_finite() { c } else { 0.0 }));
             }
         }
@@ -577,10 +576,10 @@ impl<M: Sums> Row<'_, M> {
     }
 }
 
-/// A range's first and second half.
-fn halves(range: &Range<usize>) -> (Range<usize>, Range<usize>) {
-    let middle = range.start + range.len() / 2;
-    (range.start..middle, middle..range.end)
+/// A range from its middle on, and then what is before it, backwards.
+pub(crate) fn from_middle(range: &Range<usize>) -> impl Iterator<Item = usize> + use<> {
+    let middle = range.start.midpoint(range.end);
+    (middle..range.end).chain((range.start..middle).rev())
 }
 
 /// Whether a range has all of another, which is not empty.

@@ -52,6 +52,11 @@ impl Swept {
         Swept { depths, side: self.side.max(other.side) }
     }
 
+    /// That of some rows together.
+    fn of(rows: &[Self]) -> Self {
+        rows.iter().fold(Self::NOTHING, |all, row| all.and(*row))
+    }
+
     /// The largest magnitude of a finite depth.
     pub fn deepest(&self) -> f32 {
         let [least, largest] = self.depths;
@@ -153,7 +158,7 @@ impl Windows {
 
     /// What was found in these rows: depths in the slice's and those that its windows reach, windows in the slice's.
     pub fn swept(&self, rows: Range<usize>) -> Swept {
-        self.swept[rows].iter().fold(Swept::NOTHING, |all, row| all.and(*row))
+        Swept::of(&self.swept[rows])
     }
 
     /// The sides of the slice's windows.
@@ -340,7 +345,7 @@ impl<'a> WindowRows<'a> {
     ) {
         let order = self.order;
         let far = far(points.width(), points.height());
-        let slice = swept[rows.start..end].iter().fold(Swept::NOTHING, |all, row| all.and(*row));
+        let slice = Swept::of(&swept[rows.start..end]);
         let smoothing = one_smoothing(slice.depths, options);
         for y in rows.clone().rev() {
             if y > rows.start {
@@ -593,6 +598,9 @@ fn close_ends(row: &mut [Lanes], far: f32) {
 }
 
 /// The least of what an element's three neighbours in the next row over give, and its own value.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
 #[inline(always)]
 unsafe fn nearest<S: Simd>(own: &Lanes, over: &[Lanes; 3]) -> S::F {
     // SAFETY: as the caller's.
@@ -611,6 +619,9 @@ fn three(over: &[Lanes], at: usize) -> &[Lanes; 3] {
 }
 
 /// The step along the row.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
 #[inline(always)]
 unsafe fn along<S: Simd>(nearest: S::F, before: S::F) -> S::F {
     // SAFETY: as the caller's.

@@ -34,7 +34,7 @@ impl Cloud {
     pub fn read(&mut self, points: &Points, options: &Options) -> Result<(), Error> {
         self.resize(points, options)?;
         let (width, range) = (self.width, self.has_range);
-        let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
+        let cleaned = Cleaned::new(points, options);
         let depth = |[x, y, z]: [f32; 3]| if range { (x * x + y * y + z * z).sqrt() } else { z };
         let rows = self.points.chunks_mut(width).zip(self.depths.chunks_mut(width)).enumerate();
         for (y, (points, depths)) in rows {
@@ -97,6 +97,13 @@ impl Cloud {
         [x, y, if self.has_range { z } else { 1.0 }]
     }
 
+    /// The finite points of a rectangle, in double precision.
+    pub fn finite(&self, rect: Rect) -> impl Iterator<Item = [f64; 3]> {
+        let Rect { x: columns, y: rows } = rect;
+        let rows = rows.map(move |y| &self.points[y * self.width..][columns.clone()]);
+        rows.flatten().filter(|point| !point[2].is_nan()).map(|point| point.map(f64::from))
+    }
+
     /// How many pixels before this one in its row, axis 0, or in its column the last finite one is.
     pub fn gap(&self, at: usize, axis: usize) -> Option<usize> {
         let [before, step] = [[at % self.width, 1], [at / self.width, self.width]][axis];
@@ -108,42 +115,29 @@ fn plus(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
     std::array::from_fn(|i| a[i] + b[i])
 }
 
-/// Points by column and row; a missing one is NaN.
-pub(crate) trait CleanPoints {
-    fn at(&self, x: usize, y: usize) -> [f32; 3];
+/// The user's points, looked at when they are asked for; a missing one is NaN.
+pub(crate) struct Cleaned<'a> {
+    points: &'a Points<'a>,
+    zero_is_missing: bool,
+}
 
-    /// The finite points of a rectangle, in double precision.
-    fn finite(&self, rect: Rect) -> impl Iterator<Item = [f64; 3]> {
+impl<'a> Cleaned<'a> {
+    pub fn new(points: &'a Points, options: &Options) -> Self {
+        Cleaned { points, zero_is_missing: options.zero_is_missing }
+    }
+
+    #[inline(always)]
+    pub fn at(&self, x: usize, y: usize) -> [f32; 3] {
+        let point = self.points.at(x, y);
+        let missing = !is_finite(point) || self.zero_is_missing && point == [0.0; 3];
+        if missing { [f32::NAN; 3] } else { point }
+    }
+
+    /// As [`Cloud::finite`].
+    pub fn finite(&self, rect: Rect) -> impl Iterator<Item = [f64; 3]> {
         rect.pixels()
             .map(|(x, y)| self.at(x, y))
             .filter(|point| !point[2].is_nan())
             .map(|point| point.map(f64::from))
-    }
-}
-
-impl CleanPoints for Cloud {
-    fn at(&self, x: usize, y: usize) -> [f32; 3] {
-        self.points[self.index(x, y)]
-    }
-
-    fn finite(&self, rect: Rect) -> impl Iterator<Item = [f64; 3]> {
-        let Rect { x: columns, y: rows } = rect;
-        let rows = rows.map(move |y| &self.points[y * self.width..][columns.clone()]);
-        rows.flatten().filter(|point| !point[2].is_nan()).map(|point| point.map(f64::from))
-    }
-}
-
-/// The user's points, looked at when they are asked for.
-pub(crate) struct Cleaned<'a> {
-    pub points: &'a Points<'a>,
-    pub zero_is_missing: bool,
-}
-
-impl CleanPoints for Cleaned<'_> {
-    #[inline(always)]
-    fn at(&self, x: usize, y: usize) -> [f32; 3] {
-        let point = self.points.at(x, y);
-        let missing = !is_finite(point) || self.zero_is_missing && point == [0.0; 3];
-        if missing { [f32::NAN; 3] } else { point }
     }
 }

@@ -1,13 +1,13 @@
 //! Step 4: a normal from the points in a rectangle. Plain forms, walking over it; sums over finite points only.
 
-use super::cloud::CleanPoints;
+use super::cloud::Cleaned;
 use crate::eigen::{Scatter, eigen};
 use crate::methods::{Estimate, normal_of_tangents};
 use crate::options::Method;
 use crate::rect::Rect;
 
 /// The estimate of a method of the paper; of SIMPLE_3D_GRADIENT, which it does not have, by the 3-D gradient.
-pub(crate) fn estimate(method: Method, cloud: &impl CleanPoints, rect: &Rect) -> Estimate {
+pub(crate) fn estimate(method: Method, cloud: &Cleaned, rect: &Rect) -> Estimate {
     match method {
         Method::AverageDepthChange => smoothed_depth_changes(cloud, rect),
         Method::Average3DGradient | Method::Simple3DGradient => gradients(cloud, rect),
@@ -35,7 +35,7 @@ pub(crate) fn plane_of<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> 
 }
 
 /// The 3-D gradient method: the cross product of the mean central differences of the points.
-fn gradients(cloud: &impl CleanPoints, rect: &Rect) -> Estimate {
+fn gradients(cloud: &Cleaned, rect: &Rect) -> Estimate {
     let horizontal = mean_difference(cloud, rect, (1, 0));
     let vertical = mean_difference(cloud, rect, (0, 1));
     match horizontal.zip(vertical) {
@@ -51,7 +51,7 @@ fn gradients(cloud: &impl CleanPoints, rect: &Rect) -> Estimate {
 /// Eq. 12 is the mean of z(m + 1, n) - z(m - 1, n) over radius r - 1 around (m, n); said so, it stays right where
 /// points are missing. As printed, x and y span 2r pixels where z spans 2, which tilts every normal but a frontal
 /// one; here z is extended to the pixels that x and y span.
-fn smoothed_depth_changes(cloud: &impl CleanPoints, rect: &Rect) -> Estimate {
+fn smoothed_depth_changes(cloud: &Cleaned, rect: &Rect) -> Estimate {
     let (column, row) = rect.middle();
     let horizontal = tangent(cloud, rect, &Rect { y: row..row + 1, ..rect.clone() }, (1, 0));
     let vertical = tangent(cloud, rect, &Rect { x: column..column + 1, ..rect.clone() }, (0, 1));
@@ -62,12 +62,7 @@ fn smoothed_depth_changes(cloud: &impl CleanPoints, rect: &Rect) -> Estimate {
 }
 
 /// The tangent along a line of a rectangle: x and y from its outermost points, z from the mean difference across two pixels.
-fn tangent(
-    cloud: &impl CleanPoints,
-    rect: &Rect,
-    line: &Rect,
-    step: (usize, usize),
-) -> Option<[f64; 3]> {
+fn tangent(cloud: &Cleaned, rect: &Rect, line: &Rect, step: (usize, usize)) -> Option<[f64; 3]> {
     let mut there = line.pixels().filter(|(x, y)| !cloud.at(*x, *y)[2].is_nan());
     let (from, to) = (there.next()?, there.last()?);
     let length = to.0 - from.0 + to.1 - from.1;
@@ -79,11 +74,7 @@ fn tangent(
 
 /// The mean of P(m + step) - P(m - step) over the pixels m inside the rectangle's outermost rows and columns, where
 /// both points are finite; none if there is no such pair.
-fn mean_difference(
-    cloud: &impl CleanPoints,
-    rect: &Rect,
-    (dx, dy): (usize, usize),
-) -> Option<[f64; 3]> {
+fn mean_difference(cloud: &Cleaned, rect: &Rect, (dx, dy): (usize, usize)) -> Option<[f64; 3]> {
     let (mut sum, mut count) = ([0.0; 3], 0.0);
     for (x, y) in rect.inner().pixels() {
         let (ahead, behind) = (cloud.at(x + dx, y + dy), cloud.at(x - dx, y - dy));

@@ -25,7 +25,7 @@ pub(crate) use choices::{
     ALIKE, CREASE_COST, CREASE_NOISE, EXACT_SHARE, EvenWindows, MISFIT, NEAR, NEAR_NOISE, NEXT,
     NO_WINDOW, REACH, places_at,
 };
-pub(crate) use cloud::{CleanPoints, Cleaned, Cloud};
+pub(crate) use cloud::{Cleaned, Cloud};
 pub(crate) use depth_change::{DepthChanges, between};
 pub(crate) use even_windows::{
     Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, even_window, even_windows,
@@ -110,7 +110,7 @@ pub(crate) fn estimate_window(
     if rect.x.is_empty() || rect.y.is_empty() {
         return Estimate::NONE;
     }
-    let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
+    let cleaned = Cleaned::new(points, options);
     methods::estimate(options.method, &cleaned, &rect)
 }
 
@@ -160,7 +160,7 @@ pub(crate) fn of_radius(
     if radius == 0 {
         return Estimate::NONE;
     }
-    let cleaned = Cleaned { points, zero_is_missing: options.zero_is_missing };
+    let cleaned = Cleaned::new(points, options);
     let rect = window(pixel, radius as usize, points.width(), points.height());
     let found = methods::estimate(options.method, &cleaned, &rect);
     turn_to_viewpoint(found, points.at(pixel.0, pixel.1), options.viewpoint)

@@ -5,7 +5,7 @@
 //! deviations are measured in. The sum of (1 - q P)^2, which the plane makes least, weighs them by the depths' squares,
 //! which are much the same in a window; and it is made from the moments that CM sums up (Eq. 16-25).
 
-use super::cloud::{CleanPoints, Cloud};
+use super::cloud::Cloud;
 use crate::eigen::{Scatter, Symmetric3};
 use crate::rect::Rect;
 

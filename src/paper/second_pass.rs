@@ -42,7 +42,7 @@ pub(crate) trait Engine {
         found: &mut Windows,
     ) -> Result<(), Error>;
 
-    /// The block whose window each pixel takes; the others' choices stay.
+    /// The block whose window each pixel takes, where there is one; so far there are none.
     fn choices(&mut self, even: &EvenWindows, choices: &mut [u32]);
 
     /// The estimates of windows around blocks' middle pixels, for the blocks that have one, by their radii.

@@ -1,8 +1,6 @@
 //! What the second pass builds on, fast.
 
-use super::{
-    Job, Own, WithEven, choices, compute_of_blocks, even_windows, find_depth_changes, radii,
-};
+use super::{Job, Own, choices, compute_of_blocks, even_windows, find_depth_changes, radii};
 use crate::Error;
 use crate::cloud::Normals;
 use crate::fast::{Scratch, sides};
@@ -49,15 +47,14 @@ impl Engine for FastEngine<'_> {
         found: &mut Windows,
     ) -> Result<(), Error> {
         let method = Method::CovarianceMatrix;
-        let has_normals = self.job.options.method == method;
         let Windows { even, of_even, .. } = found;
         let of_even = normals_of(of_even, &asked.blocks)?;
         let own = self.own.map(|(indices, normals)| Own { concerned, indices, normals });
-        let along = has_normals.then_some(WithEven { of_even: &of_even, own });
+        let of_even = (self.job.options.method == method).then_some(&of_even);
         // CM's sums are what even windows are made from.
         let options = &Options { method, ..self.job.options.clone() };
         let job = Job { options, ..self.job };
-        even_windows(&job, (cloud, asked), even, along, self.scratch)
+        even_windows(&job, (cloud, asked), even, (of_even, own), self.scratch)
     }
 
     fn choices(&mut self, even: &EvenWindows, found: &mut [u32]) {

@@ -10,6 +10,7 @@ use crate::cloud::Points;
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::fast::buffer::Buffer;
 use crate::fast::lanes::LANES;
+use crate::fast::moments::push_eight;
 use crate::simd::{Along, GROUP, Groups};
 
 /// x, y, z, and the weight: 1, or next to nothing for a hidden point (`layers`); 0 for a missing one, whose coordinates are
@@ -453,28 +454,6 @@ impl<const N: usize> Rings<N> {
             rest.copy_from_slice(&self.pairs[last]);
         }
         total
-    }
-}
-
-/// Adds eight pixels' channels, eight, to their row's sums and those of the row above; `carry` is the sum along the row.
-///
-/// # Safety
-/// The processor has the instruction set of `S`; the rows, above and own, have so many pixels.
-#[inline(always)]
-unsafe fn push_eight<S: Groups>(values: [S::D; 8], [above, own]: [*mut f64; 2], carry: &mut S::D) {
-    // SAFETY: as the caller's.
-    unsafe {
-        let pixels = S::transpose_d(values);
-        // What a pixel waits for is one addition a group: that to the carry.
-        let mut along = pixels[0];
-        for lane in 0..GROUP {
-            if lane > 0 {
-                along = S::add_d(along, pixels[lane]);
-            }
-            let sum = S::add_d(S::add_d(along, *carry), S::load_d(above.add(8 * lane)));
-            S::store_d(own.add(8 * lane), sum);
-        }
-        *carry = S::add_d(along, *carry);
     }
 }
 

@@ -239,14 +239,6 @@ fn find_depth_changes(
     changes.find(cloud, workers, between, is_change)
 }
 
-/// What CM finds along with even windows.
-struct WithEven<'a> {
-    /// The normals of the even windows, block by block.
-    pub of_even: &'a Normals<'a>,
-    /// In the paper's semantics those of the pixels that may take none; the others are not written.
-    pub own: Option<Own<'a>>,
-}
-
 /// Pixels' own normals.
 struct Own<'a> {
     /// The pixels that are left out.
@@ -262,7 +254,7 @@ fn even_windows(
     job: &Job,
     (cloud, asked): (&Cloud, &Asked),
     windows: &mut Vec<EvenWindow>,
-    along: Option<WithEven>,
+    (of_even, own): (Option<&Normals>, Option<Own>),
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
     for scratch in &scratch.each[..scratch.workers.count()] {
@@ -271,12 +263,11 @@ fn even_windows(
     resize(windows, asked.blocks.count(), EvenWindow::default())?;
     let largest = (0..windows.len()).map(|block| asked.largest(block)).max().unwrap_or(0) as usize;
     let windows = Parts(windows.as_mut_ptr());
-    let normals = along.as_ref().map(|along| Sink::All(along.of_even));
-    let own = along.and_then(|along| along.own);
+    let normals = of_even.map(Sink::All);
     job.even_tiles(scratch, &Even { cloud, asked, windows, normals }, own, largest)
 }
 
-/// The block whose even window each pixel takes, where there is one; the others' choices stay.
+/// The block whose even window each pixel takes, where there is one; so far there are none.
 fn choices(isa: Isa, even: &EvenWindows, choices: &mut [u32], scratch: &mut super::Scratch) {
     let super::Scratch { workers, each, .. } = scratch;
     let rows = choices.chunks_mut(BLOCK * even.cloud.width).enumerate();
@@ -519,7 +510,7 @@ impl Job<'_> {
             let scratch = &mut lock(&each[worker]).paper;
             let (tile, sink) = (&tile, &sink);
             let WorkerScratch { moments, gradients, depth_changes, waiting, .. } = scratch;
-            each_layer(tile, &paper.ranges, span(options.method), |layer| match options.method {
+            each_layer(tile, &paper.ranges, |layer| match options.method {
                 Method::CovarianceMatrix => {
                     let method = CovarianceMatrix::about(layer.origin);
                     self.layer(method, tile, layer, moments, waiting, sink)
@@ -592,7 +583,7 @@ impl Job<'_> {
             let blocks = Tile { step: BLOCK, left_out: None, ..tile.clone() };
             let tile = EvenTile { even, blocks, tile, sink: sink.as_ref() };
             let WorkerScratch { moments: rings, waiting, .. } = &mut lock(&each[worker]).paper;
-            each_layer(&tile.tile, &paper.ranges, span(options.method), |layer| {
+            each_layer(&tile.tile, &paper.ranges, |layer| {
                 let tile = &tile;
                 // SAFETY: the processor has the instruction set, and tiles do not share pixels.
                 unsafe { paths::run(self.isa, EvenTask { tile, layer, rings, waiting }) }
@@ -603,13 +594,9 @@ impl Job<'_> {
 }
 
 /// Has a tile computed layer by layer, of which `compute` returns how deep the nearest point is that pixels wait for.
-/// `ranges` has the rows' depths, of which the farthest in a layer is `span` times as deep as the nearest.
-fn each_layer(
-    tile: &Tile,
-    ranges: &[[f32; 2]],
-    span: f32,
-    mut compute: impl FnMut(&Layer) -> Option<f32>,
-) {
+/// `ranges` has the rows' depths, of which the farthest in a layer is [`span`] times as deep as the nearest.
+fn each_layer(tile: &Tile, ranges: &[[f32; 2]], mut compute: impl FnMut(&Layer) -> Option<f32>) {
+    let span = span(tile.options.method);
     let ranges = &ranges[reached(&tile.rows, tile.largest, tile.points.height())];
     let depths = ranges.iter().fold([f32::INFINITY, 0.0], |[nearest, deepest], row| {
         [row[0].min(nearest), row[1].max(deepest)]

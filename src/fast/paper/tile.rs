@@ -13,11 +13,11 @@ use crate::fast::lanes::LANES;
 use crate::fast::one_point::of_one_point;
 use crate::fast::run::{Noted, OfRun, RUN};
 use crate::fast::sink::Sink;
-use crate::fast::tile::{Bits, Estimates, all};
+use crate::fast::tile::{Bits, Estimates, all, from_middle};
 use crate::methods::Estimate;
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
-use crate::paper::{CleanPoints, Cleaned, Marks, marks_from, middle, plain_estimate, window};
+use crate::paper::{Cleaned, Marks, marks_from, middle, plain_estimate, window};
 use crate::rect::Rect;
 use crate::simd::{GROUP, Groups};
 
@@ -148,10 +148,6 @@ impl Tile<'_> {
 
     /// A point of a layer, near the middle: sums about it lose less.
     pub fn origin(&self, layer: &Layer) -> [f32; 3] {
-        let from_middle = |range: &Range<usize>| {
-            let middle = range.start.midpoint(range.end);
-            (middle..range.end).chain((range.start..middle).rev())
-        };
         for y in from_middle(&self.rows) {
             let depths = (self.row)(y).0;
             let is_in = |x: &usize| depths[*x].abs() <= layer.deepest;
@@ -252,8 +248,7 @@ impl Tile<'_> {
     ) {
         let step = self.step;
         let (width, height) = (self.points.width(), self.points.height());
-        let cleaned =
-            Cleaned { points: self.points, zero_is_missing: self.options.zero_is_missing };
+        let cleaned = Cleaned::new(self.points, self.options);
         let Run { start, radii, sums, points, lanes, left_out } = run;
         let end = self.columns.end.min(*start + RUN * step);
         let columns = self.columns.start / step..self.columns.end.div_ceil(step);

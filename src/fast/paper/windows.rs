@@ -34,12 +34,12 @@ fn margin(options: &PaperOptions) -> usize {
 /// What a sweep needs beside its map.
 #[derive(Debug, Default)]
 pub(crate) struct Sweep {
-    /// By column: the last depth, and how many rows ago it was.
+    /// By column: the last depth, and how many rows above the next one it is.
     last: Buffer<f32>,
     gap: Buffer<f32>,
-    /// The row above: masks of the depth changes to the right.
+    /// The row that is swept down: masks of the depth changes to the right.
     right: Buffer<f32>,
-    /// The row below: distances along the columns.
+    /// The row done last, above on the way down and below on the way up: distances along the columns.
     below: Buffer<f32>,
     /// Squares of them, with room before and after; and the least of each and the next ones, `AT_ONCE` in all.
     squares: Buffer<f32>,
