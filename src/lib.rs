@@ -43,6 +43,7 @@ mod rect;
 mod simd;
 mod smoothing_area;
 mod threads;
+mod vector;
 mod window;
 
 pub use cloud::{Normals, Points};

@@ -155,13 +155,3 @@ impl<S: Simd> Integers<S> {
         Floats(unsafe { S::float_i(self.0) })
     }
 }
-
-#[inline(always)]
-pub(crate) fn cross<S: Simd>(a: [Floats<S>; 3], b: [Floats<S>; 3]) -> [Floats<S>; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-#[inline(always)]
-pub(crate) fn dot<S: Simd>(a: [Floats<S>; 3], b: [Floats<S>; 3]) -> Floats<S> {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}

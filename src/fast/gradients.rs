@@ -4,12 +4,13 @@
 //! The integers are multiples of a power of two: their sums are exact whatever wraps around between, as long as the
 //! differences fit, and the limit on the coordinates sees to that.
 
-use super::arithmetic::{Floats, cross, dot};
+use super::arithmetic::Floats;
 use super::lanes::LANES;
 use super::planes::Frame;
 use super::run::{Noted, RUN};
 use super::tile::{Found, Pair};
 use crate::simd::{GROUP, Groups, Simd};
+use crate::vector::{cross, dot};
 
 /// x, y and z and nothing of something horizontal; and of something vertical. All of a pixel's are read at once, whatever
 /// the windows of its neighbours.

@@ -2,7 +2,7 @@
 //!
 //! It is of integers or of f64, as `depth` says. Half windows of one point are read from the points: exactly.
 
-use super::arithmetic::{Floats, cross, dot};
+use super::arithmetic::Floats;
 use super::buffer::Buffer;
 use super::by_side;
 use super::depth::Depth;
@@ -13,6 +13,7 @@ use crate::Error;
 use crate::memory::{bytes, make_room};
 use crate::rect::Rect;
 use crate::simd::{Groups, Simd};
+use crate::vector::{cross, dot};
 use crate::window::Image;
 
 /// The ring of integral rows of z.

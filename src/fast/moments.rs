@@ -1,7 +1,7 @@
 //! Sums of first and second moments, for COVARIANCE_MATRIX: the paper's nine integral images (Eq. 16-25), in f64 and
 //! about a point of the tile.
 
-use super::arithmetic::{Doubles, Floats, dot};
+use super::arithmetic::{Doubles, Floats};
 use super::buffer::Buffer;
 use super::lanes::LANES;
 use super::planes::{Frame, MARGIN, Planes, sum_between};
@@ -13,6 +13,7 @@ use crate::memory::{bytes, make_room};
 use crate::methods::Estimate;
 use crate::paper::ROUNDING;
 use crate::simd::{GROUP, Groups, Simd};
+use crate::vector::dot;
 use crate::window::Image;
 
 /// x, y, z, xx, xy, xz, yy, yz, zz

@@ -3,7 +3,7 @@
 
 use std::ops::{Range, RangeInclusive};
 
-use super::arithmetic::{Floats, dot};
+use super::arithmetic::Floats;
 use super::lanes::LANES;
 use super::layers::Layer;
 use super::one_point::of_one_point;
@@ -19,6 +19,7 @@ use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
 use crate::rect::Rect;
 use crate::simd::{GROUP, Groups, Simd};
+use crate::vector::dot;
 use crate::window::Image;
 
 /// What a method finds for some pixels side by side: normals of unit length, not yet turned, and curvatures.

@@ -3,6 +3,7 @@
 
 use super::{Estimate, is_length, normal_of_tangents, start};
 use crate::cloud::Points;
+use crate::vector::{cross, dot};
 use crate::window::Image;
 
 /// The plain form.
@@ -68,8 +69,8 @@ pub(crate) fn estimate(
 /// the difference of two nearly equal products. Its direction is that of f32's rounding in up to one normal of a
 /// thousand, which is kept, as the half windows' depths are in f32 exactly what PCL has.
 fn single_precision_normal(a: [f32; 3], b: [f32; 3]) -> Estimate {
-    let n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let squared_length = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+    let n = cross(a, b);
+    let squared_length = dot(n, n);
     if !is_length(squared_length.into()) {
         return Estimate::NONE;
     }

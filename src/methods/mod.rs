@@ -10,6 +10,7 @@ pub(crate) mod simple_3d_gradient;
 
 use crate::cloud::Points;
 use crate::options::Method;
+use crate::vector::{cross, dot};
 use crate::window::Image;
 
 /// What a method finds: a normal that still may point away from the viewpoint, and a curvature.
@@ -76,16 +77,11 @@ pub(crate) fn is_length(length: f64) -> bool {
     0.0 < length && length < f64::INFINITY
 }
 
-#[inline(always)]
-pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
 /// The unit vector along the cross product of two tangents; none if they are parallel or not finite.
 #[inline(always)]
 pub(crate) fn normal_of_tangents(first: [f64; 3], second: [f64; 3]) -> Estimate {
     let n = cross(first, second);
-    let squared_length = n[0] * n[0] + n[1] * n[1] + n[2] * n[2];
+    let squared_length = dot(n, n);
     if !is_length(squared_length) {
         return Estimate::NONE;
     }

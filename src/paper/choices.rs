@@ -13,6 +13,7 @@ use super::marks::Marks;
 use super::planes::{JITTER, inverse_depth};
 use crate::options::Options;
 use crate::rect::Rect;
+use crate::vector::dot;
 
 /// What the part of a window's variance that is not noise counts.
 pub(crate) const MISFIT: f32 = 3.0;
@@ -302,7 +303,7 @@ fn length([dx, dy]: [f32; 2]) -> f32 {
 
 /// The inverse depth along a ray of the plane q P = 1, or how far a plane's is above another's, of which q is the difference.
 fn inverse_depth_along(q: [f32; 3], ray: [f32; 3]) -> f32 {
-    q[0] * ray[0] + q[1] * ray[1] + q[2] * ray[2]
+    dot(q, ray)
 }
 
 /// A window that a block's pixels can take.

@@ -4,9 +4,9 @@ use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::cloud::Cloud;
 use super::summed_area::SummedArea;
 use crate::Error;
-use crate::methods::cross;
 use crate::rect::Rect;
 use crate::threads::Workers;
+use crate::vector::{cross, dot};
 
 /// Integral images of normals, one for each block.
 #[derive(Debug, Default)]
@@ -127,7 +127,7 @@ fn normal(halves: [[Sum; 2]; 2]) -> Option<[f64; 3]> {
         [d * before - a * behind, e * before - b * behind, f * before - c * behind]
     });
     let normal = cross(v, u);
-    let length2 = normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2];
+    let length2 = dot(normal, normal);
     let scale = 1.0 / length2.sqrt();
     scale.is_finite().then(|| normal.map(|n| n * scale))
 }

@@ -8,6 +8,7 @@
 use super::cloud::Cloud;
 use crate::eigen::{Scatter, Symmetric3};
 use crate::rect::Rect;
+use crate::vector::dot;
 
 /// The sensor's noise along rows and columns, in pixels: it moves points off steep planes by that many times the slope.
 pub(crate) const JITTER: f32 = 4.0;
@@ -75,10 +76,6 @@ impl Plane {
             steepness_squared: if is_deep { 0.0 } else { slope2 * angle2 },
         })
     }
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// NaN at a missing point, and at depth 0.

@@ -8,7 +8,7 @@ use std::mem::MaybeUninit;
 use super::windows::least_depth_change;
 use crate::Error;
 use crate::cloud::prefetch;
-use crate::fast::arithmetic::{Floats, dot};
+use crate::fast::arithmetic::Floats;
 use crate::fast::lanes::{LANES, Lanes};
 use crate::fast::tile::all;
 use crate::fast::windows::threshold;
@@ -20,6 +20,7 @@ use crate::paper::{
     places_at,
 };
 use crate::simd::{Along, Groups, Simd, load_by_fours};
+use crate::vector::dot;
 
 /// Finds the choices of the pixels of some rows of blocks, which are none so far; there is room.
 ///

@@ -18,6 +18,7 @@ use crate::paper::{
     even_window, middle,
 };
 use crate::simd::{GROUP, Groups};
+use crate::vector::dot;
 
 /// A window is doubtful if rounding could change its variance, or the least that is told from none, by more than this
 /// share.
@@ -485,11 +486,6 @@ fn times<S: Groups>(
     [x, y, z]: [Doubles<S>; 3],
 ) -> [Doubles<S>; 3] {
     [xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z]
-}
-
-#[inline(always)]
-fn dot<S: Groups>(a: [Doubles<S>; 3], b: [Doubles<S>; 3]) -> Doubles<S> {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// How many columns or rows, of so many, windows around `at` have.

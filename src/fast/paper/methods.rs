@@ -3,12 +3,13 @@
 
 use super::integrals::{Around, Channels, Rings, WEIGHT};
 use super::rects::Rects;
-use crate::fast::arithmetic::{Doubles, Floats, cross, dot};
+use crate::fast::arithmetic::{Doubles, Floats};
 use crate::fast::moments::{Matrices, WindowMoments};
 use crate::fast::run::{Noted, OfRun};
 use crate::fast::tile::{Bits, Found};
 use crate::paper::ROUNDING;
 use crate::simd::{GROUP, Groups, Simd};
+use crate::vector::{cross, dot};
 
 /// A method's sums and normals.
 pub(crate) trait Sums<const N: usize>: Channels<N> {

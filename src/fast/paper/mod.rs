@@ -415,17 +415,21 @@ impl Job<'_> {
             for scratch in &each[..count] {
                 lock(scratch).paper.sweep.reserve(width, &options.paper)?;
             }
-            let parts = Parts(radii.as_mut_ptr());
-            workers.for_each(chunks.len(), |worker, item| {
-                let Chunk { swept, start, own } = &chunks[item];
-                // SAFETY: chunks have rows of their own.
-                let map = unsafe { parts.part(start * length..(start + swept.len()) * length) };
-                let (first, count, own) = (swept.start, swept.len(), own.clone());
-                let rows = Rows { width, first, count, own, depths, map };
+            let mut rest = radii;
+            let parts = chunks.iter().map(|chunk| {
+                let map = rest.split_off_mut(..chunk.swept.len() * length);
+                (chunk, map.expect("a row for each that is swept"))
+            });
+            workers.share(parts, |worker, parts| {
                 let sweep = &mut lock(&each[worker]).paper.sweep;
-                // SAFETY: the processor has the instruction set.
-                let radius = unsafe { paths::run(self.isa, SweepTask { rows, options, sweep }) };
-                largest.fetch_max(radius as u32, Ordering::Relaxed);
+                for (Chunk { swept, own, .. }, map) in parts {
+                    let (first, count, own) = (swept.start, swept.len(), own.clone());
+                    let rows = Rows { width, first, count, own, depths, map };
+                    let task = SweepTask { rows, options, sweep };
+                    // SAFETY: the processor has the instruction set.
+                    let radius = unsafe { paths::run(self.isa, task) };
+                    largest.fetch_max(radius as u32, Ordering::Relaxed);
+                }
             });
         } else {
             let maps = PaperMaps::new(points, options)?;
