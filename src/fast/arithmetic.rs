@@ -5,6 +5,7 @@
 
 use std::ops::{Add, Div, Mul, Sub};
 
+use super::lanes::{LANES, Lanes};
 use crate::simd::Simd;
 
 /// As many f32 as there are lanes.
@@ -47,6 +48,28 @@ impl<S: Simd> Floats<S> {
     pub unsafe fn splat(value: f32) -> Self {
         // SAFETY: as the caller's.
         Floats(unsafe { S::splat(value) })
+    }
+
+    /// The least lane; none is NaN.
+    #[inline(always)]
+    pub fn least(self) -> f32 {
+        self.lanes(f32::INFINITY).least()
+    }
+
+    /// The largest lane; none is NaN.
+    #[inline(always)]
+    pub fn largest(self) -> f32 {
+        self.lanes(f32::NEG_INFINITY).largest()
+    }
+
+    /// The lanes, and `rest` in place of those that `S` does not have.
+    #[inline(always)]
+    fn lanes(self, rest: f32) -> Lanes {
+        const { assert!(S::LANES <= LANES) };
+        let mut lanes = Lanes([rest; LANES]);
+        // SAFETY: there is a group, so there is the instruction set; its lanes fit.
+        unsafe { S::store(lanes.0.as_mut_ptr(), self.0) };
+        lanes
     }
 
     /// A whole number up to 2^24: floats hold it.

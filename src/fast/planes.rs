@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::arithmetic::Floats;
 use super::buffer::{Buffer, Number};
 use super::incomplete::Incomplete;
 use super::lanes::LANES;
@@ -222,12 +223,10 @@ impl Planes {
                 S::store(ys.add(at), y);
                 S::store(zs.add(at), z);
             }
-            let mut lanes = [0.0; LANES];
-            S::store(lanes.as_mut_ptr(), largest);
             if S::bits(incomplete) != 0 {
                 self.incomplete.note(points, frame, y, held);
             }
-            lanes.into_iter().fold(0.0, f32::max)
+            Floats::<S>(largest).largest()
         }
     }
 }

@@ -364,9 +364,7 @@ impl Tile<'_> {
                     largest = S::max(largest, S::splat(*row.add(x)));
                 }
             }
-            let mut lanes = [0.0; GROUP];
-            S::store(lanes.as_mut_ptr(), largest);
-            lanes.into_iter().fold(0.0, f32::max) as usize
+            Floats::<S>(largest).largest() as usize
         }
     }
 

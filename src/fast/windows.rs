@@ -7,6 +7,7 @@
 
 use std::ops::Range;
 
+use super::arithmetic::Floats;
 use super::buffer::Buffer;
 use super::lanes::{LANES, LaneOrder, Lanes};
 use crate::Error;
@@ -424,7 +425,8 @@ impl Sweep {
                 left = to_right;
                 own = right;
             }
-            least_and_largest::<S>(range)
+            let [least, largest] = range;
+            [Floats::<S>(least).least(), Floats::<S>(largest).largest()]
         }
     }
 
@@ -449,7 +451,8 @@ impl Sweep {
                 row[k].store::<S>(S::and_not(above, S::splat(far)));
                 range = widened::<S>(range, own, S::finite(own));
             }
-            least_and_largest::<S>(range)
+            let [least, largest] = range;
+            [Floats::<S>(least).least(), Floats::<S>(largest).largest()]
         }
     }
 
@@ -474,9 +477,8 @@ impl Sweep {
         }
         let z = &self.z[Self::z_place(order, y)];
         let (distances, sides) = (&row[1..=segment], &mut self.sides[..segment]);
-        let mut largest = Lanes::ZERO;
         // SAFETY: as the caller's; the sides fit i32.
-        unsafe {
+        let largest = unsafe {
             let mut so_far = S::splat(0.0);
             if let Some(smoothing) = smoothing {
                 let smoothing = S::splat(smoothing);
@@ -495,8 +497,8 @@ impl Sweep {
                     sides[k].store::<S>(side);
                 }
             }
-            largest.store::<S>(so_far);
-        }
+            Floats::<S>(so_far).largest()
+        };
         let row = floats_mut(row);
         order.write(&self.sides, row);
         // The one pixel whose own depth nobody tests.
@@ -509,7 +511,7 @@ impl Sweep {
         }
         row[..border].fill(0.0);
         row[order.width - border..order.width].fill(0.0);
-        largest.largest()
+        largest
     }
 }
 
@@ -547,21 +549,6 @@ unsafe fn widened<S: Simd>([least, largest]: [S::F; 2], z: S::F, finite: S::F) -
         let z = S::or(S::and_not(finite, S::splat(f32::NAN)), z);
         [S::min(z, least), S::max(z, largest)]
     }
-}
-
-/// The least of the first lanes, and the largest of the others.
-///
-/// # Safety
-/// The processor has the instruction set of `S`, which has sixteen lanes.
-#[inline(always)]
-unsafe fn least_and_largest<S: Simd>([least, largest]: [S::F; 2]) -> [f32; 2] {
-    let mut lanes = [Lanes::ZERO; 2];
-    // SAFETY: as the caller's.
-    unsafe {
-        lanes[0].store::<S>(least);
-        lanes[1].store::<S>(largest);
-    }
-    [lanes[0].least(), lanes[1].largest()]
 }
 
 /// `depth_change::threshold`

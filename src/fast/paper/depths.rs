@@ -1,6 +1,7 @@
 //! The depths of a row of points, and these themselves, missing ones NaN.
 
 use crate::cloud::{PointRow, Points};
+use crate::fast::arithmetic::Floats;
 use crate::fast::lanes::{LANES, Lanes};
 use crate::fast::paths::Task;
 use crate::options::{Depth, Options};
@@ -41,11 +42,7 @@ pub(crate) unsafe fn read<S: Along>(
             deepest = S::max(S::and(there, magnitude), deepest);
         }
         depths[width..].fill(f32::NAN);
-        let mut lanes = [Lanes([f32::INFINITY; LANES]), Lanes::ZERO];
-        for (to, lane) in lanes.iter_mut().zip([nearest, deepest]) {
-            S::store(to.0.as_mut_ptr(), lane);
-        }
-        [lanes[0].least(), lanes[1].largest()]
+        [Floats::<S>(nearest).least(), Floats::<S>(deepest).largest()]
     }
 }
 

@@ -344,9 +344,7 @@ impl<const N: usize> Rings<N> {
                 }
                 S::store(to.add(WEIGHT * stride + x), S::and(there, S::splat(1.0)));
             }
-            let mut lanes = [0.0; LANES];
-            S::store(lanes.as_mut_ptr(), largest);
-            self.largest = lanes.into_iter().fold(0.0, f32::max);
+            self.largest = Floats::<S>(largest).largest();
         }
         self.end_row(y);
         if self.layer.hides_some() {

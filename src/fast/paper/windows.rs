@@ -9,6 +9,7 @@ use std::ops::Range;
 
 use super::depths::row_length;
 use crate::Error;
+use crate::fast::arithmetic::Floats;
 use crate::fast::buffer::Buffer;
 use crate::fast::lanes::{LANES, Lanes};
 use crate::fast::tile::Bits;
@@ -239,9 +240,7 @@ impl Sweep {
                     S::store(map.add(x), radius);
                 }
             }
-            let mut lanes = [0.0; LANES];
-            S::store(lanes.as_mut_ptr(), largest);
-            lanes.into_iter().fold(0.0, f32::max)
+            Floats::<S>(largest).largest()
         }
     }
 }
