@@ -248,8 +248,9 @@ struct Own<'a> {
     pub normals: &'a Normals<'a>,
 }
 
-/// The even windows of all blocks, and what is to be found along with them; the job's method is CM. The depths have been
-/// read, and the pixels' own windows are those that [`radii`] has found. Afterwards there is room for [`choices`].
+/// The even windows of all blocks, and if they are asked for, their normals `of_even`, block by block, and in the paper's
+/// semantics pixels' `own`; the job's method is CM. The depths have been read, and the pixels' own windows are those that
+/// [`radii`] has found. Afterwards there is room for [`choices`].
 fn even_windows(
     job: &Job,
     (cloud, asked): (&Cloud, &Asked),
