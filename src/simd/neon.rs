@@ -45,6 +45,9 @@ impl Simd for Neon {
         sqrt(a: Self::F) -> Self::F = vsqrtq_f32;
         add_i(a: Self::I, b: Self::I) -> Self::I = vaddq_s32;
         sub_i(a: Self::I, b: Self::I) -> Self::I = vsubq_s32;
+        round_i(a: Self::F) -> Self::I = vcvtnq_s32_f32;
+        truncate_i(a: Self::F) -> Self::I = vcvtq_s32_f32;
+        float_i(a: Self::I) -> Self::F = vcvtq_f32_s32;
     }
 
     calls! { of 4:
@@ -81,12 +84,7 @@ impl Simd for Neon {
     }
     #[inline(always)]
     unsafe fn lt(a: Self::F, b: Self::F) -> Self::F {
-        unsafe {
-            [
-                vreinterpretq_f32_u32(vcltq_f32(a[0], b[0])),
-                vreinterpretq_f32_u32(vcltq_f32(a[1], b[1])),
-            ]
-        }
+        unsafe { each!(2 vreinterpretq_f32_u32, each!(2 vcltq_f32, a, b)) }
     }
     #[inline(always)]
     unsafe fn eq(a: Self::F, b: Self::F) -> Self::F {
@@ -140,18 +138,6 @@ impl Simd for Neon {
     #[inline(always)]
     unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
         unsafe { each!(2 vbslq_s32, lane_masks(lanes), yes, no) }
-    }
-    #[inline(always)]
-    unsafe fn round_i(a: Self::F) -> Self::I {
-        unsafe { [vcvtnq_s32_f32(a[0]), vcvtnq_s32_f32(a[1])] }
-    }
-    #[inline(always)]
-    unsafe fn truncate_i(a: Self::F) -> Self::I {
-        unsafe { [vcvtq_s32_f32(a[0]), vcvtq_s32_f32(a[1])] }
-    }
-    #[inline(always)]
-    unsafe fn float_i(a: Self::I) -> Self::F {
-        unsafe { [vcvtq_f32_s32(a[0]), vcvtq_f32_s32(a[1])] }
     }
 
     #[inline(always)]

@@ -18,6 +18,17 @@ fn zip<A: Copy, B: Copy, C>(a: [A; GROUP], b: [B; GROUP], f: impl Fn(A, B) -> C)
 }
 
 #[inline(always)]
+fn select<T: Copy>(lanes: u32, yes: [T; GROUP], no: [T; GROUP]) -> [T; GROUP] {
+    let mut selected = no;
+    for lane in 0..GROUP {
+        if lanes >> lane & 1 != 0 {
+            selected[lane] = yes[lane];
+        }
+    }
+    selected
+}
+
+#[inline(always)]
 fn bitwise(a: F, b: F, f: impl Fn(u32, u32) -> u32) -> F {
     zip(a, b, |a: f32, b: f32| f32::from_bits(f(a.to_bits(), b.to_bits())))
 }
@@ -162,12 +173,8 @@ impl Simd for Portable {
         zip(a, b, i32::wrapping_sub)
     }
     #[inline(always)]
-    unsafe fn select_i(bits: u32, yes: I, no: I) -> I {
-        let mut lanes = no;
-        for l in 0..GROUP {
-            lanes[l] = if bits >> l & 1 != 0 { yes[l] } else { no[l] };
-        }
-        lanes
+    unsafe fn select_i(lanes: u32, yes: I, no: I) -> I {
+        select(lanes, yes, no)
     }
     #[inline(always)]
     unsafe fn round_i(a: F) -> I {
@@ -225,12 +232,8 @@ impl Simd for Portable {
         (0..GROUP).fold(0, |bits, l| bits | u32::from(a[l] < b[l]) << l)
     }
     #[inline(always)]
-    unsafe fn select_bits_d(bits: u32, yes: D, no: D) -> D {
-        let mut lanes = no;
-        for l in 0..GROUP {
-            lanes[l] = if bits >> l & 1 != 0 { yes[l] } else { no[l] };
-        }
-        lanes
+    unsafe fn select_bits_d(lanes: u32, yes: D, no: D) -> D {
+        select(lanes, yes, no)
     }
     #[inline(always)]
     unsafe fn widen(a: F) -> D {

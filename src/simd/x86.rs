@@ -76,6 +76,9 @@ impl Simd for Sse2 {
         and_not(mask: Self::F, a: Self::F) -> Self::F = _mm_andnot_ps;
         add_i(a: Self::I, b: Self::I) -> Self::I = _mm_add_epi32;
         sub_i(a: Self::I, b: Self::I) -> Self::I = _mm_sub_epi32;
+        round_i(a: Self::F) -> Self::I = _mm_cvtps_epi32;
+        truncate_i(a: Self::F) -> Self::I = _mm_cvttps_epi32;
+        float_i(a: Self::I) -> Self::F = _mm_cvtepi32_ps;
     }
 
     calls! { of 4:
@@ -129,18 +132,6 @@ impl Simd for Sse2 {
             let mask = [_mm_castps_si128(mask[0]), _mm_castps_si128(mask[1])];
             each!(2 _mm_or_si128, each!(2 _mm_and_si128, mask, yes), each!(2 _mm_andnot_si128, mask, no))
         }
-    }
-    #[inline(always)]
-    unsafe fn round_i(a: Self::F) -> Self::I {
-        unsafe { [_mm_cvtps_epi32(a[0]), _mm_cvtps_epi32(a[1])] }
-    }
-    #[inline(always)]
-    unsafe fn truncate_i(a: Self::F) -> Self::I {
-        unsafe { [_mm_cvttps_epi32(a[0]), _mm_cvttps_epi32(a[1])] }
-    }
-    #[inline(always)]
-    unsafe fn float_i(a: Self::I) -> Self::F {
-        unsafe { [_mm_cvtepi32_ps(a[0]), _mm_cvtepi32_ps(a[1])] }
     }
 
     #[inline(always)]
