@@ -60,16 +60,12 @@ impl Error {
         match self {
             Error::NullPointer => c"a required pointer is NULL",
             Error::StructSize => c"struct_size is not a known size of the struct",
-            Error::Size => {
-                c"width or height is zero, their product is too large, or the buffer does not fit"
-            }
+            Error::Size => c"width or height is zero, too large, or not that of the buffers",
             Error::Stride => c"a stride is not a multiple of 4 bytes or is too small",
             Error::Misaligned => c"a pointer is not aligned to its type",
             Error::Overlap => c"output bytes overlap input bytes or other output bytes",
             Error::OptionValue => c"an option's value is outside its range",
-            Error::Unsupported => {
-                c"the method or the semantics do not go with this border policy or this map"
-            }
+            Error::Unsupported => c"options or maps that do not go together",
             Error::Index => c"an index is outside the cloud",
             Error::OutOfMemory => c"out of memory",
             Error::Threads => c"the worker threads could not be started",

@@ -352,7 +352,8 @@ int32_t iine_estimator_compute(struct iine_estimator *estimator,
 /**
  * Computes the normals of the pixels that `indices` lists (row * width + column, any order, repeats allowed):
  * element k of `normals`, `normals->point_stride` bytes after element k - 1, belongs to indices[k] and equals
- * what `iine_estimator_compute` gives for that pixel. A `count` of 0 does nothing, and `indices` may be NULL then.
+ * what `iine_estimator_compute` gives for that pixel. With a `count` of 0 only the estimator and the points are
+ * looked at, and `indices` and `normals` may be NULL.
  *
  * Errors: as `iine_estimator_compute`, also in what is written then, and IINE_ERROR_INDEX if an index is outside the
  * cloud.
@@ -669,7 +670,7 @@ const char *iine_version_string(void);
  * The name of the instruction set in use: "avx512", "avx2", "sse2", "neon", "portable" or "scalar"; static.
  *
  * The best one that the processor has is chosen at the first use. The environment variable `IINE_ISA`, read at
- * the first use, forces it down to one of these names; what the processor lacks is ignored.
+ * the first use, forces it down to one of these names; any other, and what the processor lacks, is ignored.
  */
 const char *iine_isa_name(void);
 

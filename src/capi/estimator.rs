@@ -110,7 +110,8 @@ pub unsafe extern "C" fn iine_estimator_compute(
 
 /// Computes the normals of the pixels that `indices` lists (row * width + column, any order, repeats allowed):
 /// element k of `normals`, `normals->point_stride` bytes after element k - 1, belongs to indices[k] and equals
-/// what `iine_estimator_compute` gives for that pixel. A `count` of 0 does nothing, and `indices` may be NULL then.
+/// what `iine_estimator_compute` gives for that pixel. With a `count` of 0 only the estimator and the points are
+/// looked at, and `indices` and `normals` may be NULL.
 ///
 /// Errors: as `iine_estimator_compute`, also in what is written then, and IINE_ERROR_INDEX if an index is outside the
 /// cloud.

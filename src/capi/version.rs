@@ -27,7 +27,7 @@ pub extern "C" fn iine_version_string() -> *const c_char {
 /// The name of the instruction set in use: "avx512", "avx2", "sse2", "neon", "portable" or "scalar"; static.
 ///
 /// The best one that the processor has is chosen at the first use. The environment variable `IINE_ISA`, read at
-/// the first use, forces it down to one of these names; what the processor lacks is ignored.
+/// the first use, forces it down to one of these names; any other, and what the processor lacks, is ignored.
 #[unsafe(no_mangle)]
 pub extern "C" fn iine_isa_name() -> *const c_char {
     crate::Isa::active().c_name().as_ptr()
