@@ -557,8 +557,10 @@ impl Normals<'_> {
         while x >= columns.end {
             (x, y) = (x - columns.len(), y + 1);
         }
-        let first = self.normal[0].wrapping_byte_add(self.grid.offset(x, y));
-        prefetch(first, count, self.grid.point_stride);
+        let Grid { point_stride, row_stride, .. } = self.grid;
+        // There may be no such row, nor an address for it.
+        let offset = y.wrapping_mul(row_stride).wrapping_add(x * point_stride);
+        prefetch(self.normal[0].wrapping_byte_add(offset), count, point_stride);
     }
 
     /// Writes as many pixels of a row as there are lanes: nx, ny, nz and the curvature.
