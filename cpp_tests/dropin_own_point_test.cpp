@@ -6,7 +6,6 @@
 
 #include <gtest/gtest.h>
 
-#include <pcl/features/impl/integral_image_normal.hpp>
 #include <pcl/features/integral_image_normal.h>
 #include <pcl/point_types.h>
 

@@ -116,7 +116,10 @@ fn check_field(field: *const f32, grid: &Grid) -> Result<usize, Error> {
 
 /// The points of an organized cloud: `width` x `height` pixels of x, y, z in any unit of length, z being depth.
 ///
-/// A missing point has a non-finite coordinate.
+/// To mark a point missing, make its z NaN, or all three. With [`Semantics::Pcl`](crate::Semantics::Pcl) z alone decides,
+/// as in PCL: a pixel whose x or y is not finite but whose z is still gets a normal, which may point to either side. With
+/// [`Semantics::Paper`](crate::Semantics::Paper), one-sided or crease windows, or missing zeros, a point is missing if any of
+/// its coordinates is not finite.
 #[derive(Clone, Copy, Debug)]
 pub struct Points<'a> {
     x: *const f32,

@@ -2,7 +2,8 @@
 
 use std::fmt;
 
-/// Why a request was refused. Nothing has been written when one of these is returned (but see [`Error::OutOfMemory`]).
+/// Why a request was refused. Nothing has been written when one of these is returned (but see [`Error::OutOfMemory`]
+/// and [`Error::Internal`]).
 ///
 /// The discriminants are the status numbers of the C API; they are never reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -34,7 +35,7 @@ pub enum Error {
     OutOfMemory = 10,
     /// The worker threads asked for could not be started.
     Threads = 11,
-    /// A defect of this library was caught at its boundary; please report it.
+    /// A defect of this library was caught at its boundary, possibly after something was written; please report it.
     Internal = 12,
 }
 

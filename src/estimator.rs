@@ -22,9 +22,13 @@ pub struct Maps<'a> {
     /// Radius that the depth asks for (the paper's B, Eq. 5), within its limits, in pixels; NaN at missing points.
     /// Only with [`Semantics::Paper`](crate::Semantics::Paper).
     pub depth_radii: Option<&'a mut [f32]>,
-    /// Depth change indication map (the paper's C): 1 at a depth change, else 0.
+    /// Depth change indication map (the paper's C): 1 at a depth change, else 0. With
+    /// [`Semantics::Pcl`](crate::Semantics::Pcl) both pixels of a change are marked, and those at and beside a z that is not
+    /// finite; with [`Semantics::Paper`](crate::Semantics::Paper) the pixel before the change (Eq. 7), and missing points are
+    /// none.
     pub depth_changes: Option<&'a mut [u8]>,
-    /// Distance to the nearest depth change in pixels (the paper's T; PCL's `getDistanceMap`).
+    /// Distance to the nearest depth change in pixels (the paper's T; PCL's `getDistanceMap`). Without any in the image:
+    /// width + height, with [`Semantics::Paper`](crate::Semantics::Paper) infinity.
     pub distances: Option<&'a mut [f32]>,
     /// Smoothing area map: the side of the pixel's window in pixels, or with
     /// [`Semantics::Paper`](crate::Semantics::Paper) its radius R (Eq. 8); 0 where there is no window.
@@ -82,8 +86,9 @@ impl Estimator {
 
     /// Computes the normal of every pixel of `points` into `normals`, which must be of the same size.
     ///
-    /// Normals have unit length and point to the viewpoint's side; pixels without one get NaN, also as curvature (which is 0
-    /// where all points of a PCL window of [`Method::CovarianceMatrix`] are one place).
+    /// Normals have unit length and point to the viewpoint's side (to either where the pixel's x or y is not finite); pixels
+    /// without one get NaN, also as curvature (which is 0 where all points of a PCL window of [`Method::CovarianceMatrix`]
+    /// are one place).
     /// Errors: [`Error::Size`] if the sizes differ, [`Error::Overlap`], [`Error::OutOfMemory`], [`Error::Threads`], and what
     /// [`Options::check`] refuses.
     pub fn compute(&mut self, points: &Points, normals: &mut Normals) -> Result<(), Error> {

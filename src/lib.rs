@@ -4,6 +4,9 @@
 //! Estimation from Organized Point Cloud Data Using Integral Images*, IROS 2012, with the semantics of PCL's class
 //! `pcl::IntegralImageNormalEstimation`.
 //!
+//! Beyond PCL, and off by default in [`Options`]: the paper's own windows and methods ([`Semantics::Paper`]), windows on one
+//! side of a depth change, and windows that keep off edges between surfaces.
+//!
 //! ```
 //! use iine::{Estimator, Normals, Options, Points};
 //!

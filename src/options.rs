@@ -17,7 +17,7 @@ pub enum Method {
     /// `AVERAGE_DEPTH_CHANGE`).
     AverageDepthChange = 2,
     /// Cross product of the differences of the window's outermost strips (PCL's `SIMPLE_3D_GRADIENT`);
-    /// not with [`BorderPolicy::Mirror`].
+    /// not with [`BorderPolicy::Mirror`], nor with [`Semantics::Paper`].
     Simple3DGradient = 3,
 }
 
@@ -186,7 +186,8 @@ pub struct Options {
     /// Adds a tenth of the pixel's z (signed, in the cloud's unit) to the smoothing size; default off.
     pub depth_dependent_smoothing: bool,
     /// Two neighbours are a depth change apart if their z differ by more than
-    /// `2 * max_depth_change_factor * (|z| + 1)`; in the cloud's unit, default 0.02, any number.
+    /// `2 * max_depth_change_factor * (|z| + 1)`, z being that of the left or upper one, or if either z is not finite; in
+    /// the cloud's unit, default 0.02, any number.
     pub max_depth_change_factor: f32,
     /// The point the normals are turned towards, in the cloud's coordinates; default the origin.
     pub viewpoint: [f32; 3],
@@ -199,8 +200,8 @@ pub struct Options {
     pub paper: PaperOptions,
     /// Takes points at (0, 0, 0) as missing, as LiDARs and some depth cameras write them; default off.
     pub zero_is_missing: bool,
-    /// Gives pixels near a depth change a window of their own side, and with it a normal to every pixel that has
-    /// two neighbours on its surface not in line with it; default off. Takes the sensor's [`PaperOptions::alpha`] and
+    /// Gives pixels near a depth change a window on their own side of it, so that every pixel with two neighbours on its
+    /// surface that are not in line with it has a normal; default off. Takes the sensor's [`PaperOptions::alpha`] and
     /// [`PaperOptions::largest_radius`] in either semantics.
     pub one_sided_windows: bool,
     /// In a second pass moves windows off the places where the normals vary strongly, so that edges

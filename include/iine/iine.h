@@ -2,9 +2,9 @@
  * iine: normals of organized point clouds by integral images.
  *
  * Functions return a status: IINE_OK (0), or one of IINE_ERROR_*, and then have written nothing (but see
- * IINE_ERROR_OUT_OF_MEMORY); iine_status_string() has the text. Nothing here prints, exits or throws, with two
- * exceptions: with IINE_ERROR_INTERNAL, a defect of this library, stderr says what went wrong; and where memory for
- * starting threads is missing, the process may be aborted.
+ * IINE_ERROR_OUT_OF_MEMORY and IINE_ERROR_INTERNAL); iine_status_string() has the text. Nothing here prints, exits or
+ * throws, with two exceptions: with IINE_ERROR_INTERNAL, a defect of this library, stderr says what went wrong; and
+ * where memory for starting threads is missing, the process may be aborted.
  */
 
 #ifndef IINE_IINE_H
@@ -79,7 +79,7 @@
 #define IINE_ERROR_THREADS 11
 
 /**
- * A defect of this library was caught at its boundary.
+ * A defect of this library was caught at its boundary, possibly after something was written.
  */
 #define IINE_ERROR_INTERNAL 12
 
@@ -174,8 +174,13 @@ typedef struct iine_estimator iine_estimator;
  * The three pointers are the addresses of the first pixel's coordinates; the same strides lead from each to the
  * next pixel and to the next row. Interleaved points have y = x + 1, z = x + 2; separate planes have three
  * pointers of their own and a `point_stride` of 4. Clear the struct, set `struct_size`, then the fields you use.
- * A missing point has a non-finite coordinate. The four bytes behind z of interleaved points may be read too, but not
- * behind the last point of a row, or of all where rows follow each other.
+ *
+ * To mark a point missing, make its z NaN, or all three. With IINE_SEMANTICS_PCL z alone decides, as in PCL: a pixel whose
+ * x or y is not finite but whose z is still gets a normal, which may point to either side. With IINE_SEMANTICS_PAPER,
+ * one-sided or crease windows, or missing zeros, a point is missing if any of its coordinates is not finite.
+ *
+ * Of interleaved points the four bytes behind z may be read too, except behind the last point of a row (behind the cloud's
+ * last point where rows follow each other).
  */
 typedef struct iine_points {
   /**
@@ -242,7 +247,8 @@ typedef struct iine_normals {
   size_t point_stride;
   /**
    * Bytes from a row to the next; a multiple of 4, at least width * point_stride; 0 means just that.
-   * Not used, as the curvature's, by `iine_estimator_compute_indices` and `iine_estimator_compute_window`.
+   * Neither this nor `curvature_row_stride` is used by `iine_estimator_compute_indices` and
+   * `iine_estimator_compute_window`.
    */
   size_t row_stride;
   /**
@@ -270,11 +276,14 @@ typedef struct iine_maps {
    */
   size_t struct_size;
   /**
-   * Depth change indication map (the paper's C): 1 at a depth change, else 0.
+   * Depth change indication map (the paper's C): 1 at a depth change, else 0. With IINE_SEMANTICS_PCL both pixels of a
+   * change are marked, and those at and beside a z that is not finite; with IINE_SEMANTICS_PAPER the pixel before the
+   * change (Eq. 7), and missing points are none.
    */
   uint8_t *depth_changes;
   /**
-   * Distance in pixels to the nearest depth change (the paper's T; PCL's `getDistanceMap`).
+   * Distance in pixels to the nearest depth change (the paper's T; PCL's `getDistanceMap`). Without any in the image:
+   * width + height, with IINE_SEMANTICS_PAPER infinity.
    */
   float *distances;
   /**
@@ -453,8 +462,9 @@ int32_t iine_estimator_set_method(struct iine_estimator *estimator, int32_t meth
 int32_t iine_estimator_set_border_policy(struct iine_estimator *estimator, int32_t border_policy);
 
 /**
- * Sets the smoothing size in pixels, the side of the largest window without depth-dependent smoothing: finite, above 0;
- * default 10.
+ * Sets the smoothing size in pixels: finite, above 0; default 10. The side of a pixel's window is
+ * min(distance to the nearest depth change, smoothing size) rounded down; where that minimum is not above 2 there is no
+ * normal, so that sizes up to 2 give none.
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
  *
@@ -478,7 +488,8 @@ int32_t iine_estimator_set_depth_dependent_smoothing(struct iine_estimator *esti
 
 /**
  * Sets the factor of the depth change threshold: two neighbours are a depth change apart if their z differ by
- * more than 2 * factor * (|z| + 1), in the cloud's unit. Any number; default 0.02.
+ * more than 2 * factor * (|z| + 1), in the cloud's unit, z being that of the left or upper one, or if either z is not
+ * finite. Any number; default 0.02.
  *
  * Errors: IINE_ERROR_NULL_POINTER.
  *
@@ -613,8 +624,8 @@ int32_t iine_estimator_set_paper_depth(struct iine_estimator *estimator, int32_t
 int32_t iine_estimator_set_zero_is_missing(struct iine_estimator *estimator, int32_t zero_is_missing);
 
 /**
- * Whether pixels near a depth change get a window of their own side, and with it a normal every pixel that has
- * two neighbours on its surface not in line with it: 0 (the default) or 1. With either semantics; takes the sensor's
+ * Whether pixels near a depth change get a window on their own side of it, so that every pixel with two neighbours on its
+ * surface that are not in line with it has a normal: 0 (the default) or 1. With either semantics; takes the sensor's
  * alpha from `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of
  * `iine_estimator_set_paper_radii`.
  *

@@ -86,8 +86,9 @@ pub unsafe extern "C" fn iine_estimator_set_border_policy(
     unsafe { set(estimator, change) }
 }
 
-/// Sets the smoothing size in pixels, the side of the largest window without depth-dependent smoothing: finite, above 0;
-/// default 10.
+/// Sets the smoothing size in pixels: finite, above 0; default 10. The side of a pixel's window is
+/// min(distance to the nearest depth change, smoothing size) rounded down; where that minimum is not above 2 there is no
+/// normal, so that sizes up to 2 give none.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
 ///
@@ -130,7 +131,8 @@ pub unsafe extern "C" fn iine_estimator_set_depth_dependent_smoothing(
 }
 
 /// Sets the factor of the depth change threshold: two neighbours are a depth change apart if their z differ by
-/// more than 2 * factor * (|z| + 1), in the cloud's unit. Any number; default 0.02.
+/// more than 2 * factor * (|z| + 1), in the cloud's unit, z being that of the left or upper one, or if either z is not
+/// finite. Any number; default 0.02.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER.
 ///
@@ -369,8 +371,8 @@ pub unsafe extern "C" fn iine_estimator_set_zero_is_missing(
     unsafe { set(estimator, change) }
 }
 
-/// Whether pixels near a depth change get a window of their own side, and with it a normal every pixel that has
-/// two neighbours on its surface not in line with it: 0 (the default) or 1. With either semantics; takes the sensor's
+/// Whether pixels near a depth change get a window on their own side of it, so that every pixel with two neighbours on its
+/// surface that are not in line with it has a normal: 0 (the default) or 1. With either semantics; takes the sensor's
 /// alpha from `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of
 /// `iine_estimator_set_paper_radii`.
 ///

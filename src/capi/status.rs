@@ -45,7 +45,7 @@ pub const IINE_ERROR_INDEX: i32 = 9;
 pub const IINE_ERROR_OUT_OF_MEMORY: i32 = 10;
 /// The worker threads asked for could not be started.
 pub const IINE_ERROR_THREADS: i32 = 11;
-/// A defect of this library was caught at its boundary.
+/// A defect of this library was caught at its boundary, possibly after something was written.
 pub const IINE_ERROR_INTERNAL: i32 = 12;
 
 /// The text of a status: static, never NULL, for any number.

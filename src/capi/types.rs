@@ -57,8 +57,13 @@ pub const IINE_DEPTH_RANGE: i32 = 1;
 /// The three pointers are the addresses of the first pixel's coordinates; the same strides lead from each to the
 /// next pixel and to the next row. Interleaved points have y = x + 1, z = x + 2; separate planes have three
 /// pointers of their own and a `point_stride` of 4. Clear the struct, set `struct_size`, then the fields you use.
-/// A missing point has a non-finite coordinate. The four bytes behind z of interleaved points may be read too, but not
-/// behind the last point of a row, or of all where rows follow each other.
+///
+/// To mark a point missing, make its z NaN, or all three. With IINE_SEMANTICS_PCL z alone decides, as in PCL: a pixel whose
+/// x or y is not finite but whose z is still gets a normal, which may point to either side. With IINE_SEMANTICS_PAPER,
+/// one-sided or crease windows, or missing zeros, a point is missing if any of its coordinates is not finite.
+///
+/// Of interleaved points the four bytes behind z may be read too, except behind the last point of a row (behind the cloud's
+/// last point where rows follow each other).
 #[repr(C)]
 #[derive(Clone, Copy)]
 #[allow(non_camel_case_types)]
@@ -101,7 +106,8 @@ pub struct iine_normals {
     /// Bytes from a pixel's normal to the next; a multiple of 4, at least 4.
     pub point_stride: usize,
     /// Bytes from a row to the next; a multiple of 4, at least width * point_stride; 0 means just that.
-    /// Not used, as the curvature's, by `iine_estimator_compute_indices` and `iine_estimator_compute_window`.
+    /// Neither this nor `curvature_row_stride` is used by `iine_estimator_compute_indices` and
+    /// `iine_estimator_compute_window`.
     pub row_stride: usize,
     /// The first pixel's curvature (smallest eigenvalue over the trace, 0 to 1/3), or NULL for none.
     /// NaN for the methods that give none.
@@ -120,9 +126,12 @@ pub struct iine_normals {
 pub struct iine_maps {
     /// `sizeof(iine_maps)`.
     pub struct_size: usize,
-    /// Depth change indication map (the paper's C): 1 at a depth change, else 0.
+    /// Depth change indication map (the paper's C): 1 at a depth change, else 0. With IINE_SEMANTICS_PCL both pixels of a
+    /// change are marked, and those at and beside a z that is not finite; with IINE_SEMANTICS_PAPER the pixel before the
+    /// change (Eq. 7), and missing points are none.
     pub depth_changes: *mut u8,
-    /// Distance in pixels to the nearest depth change (the paper's T; PCL's `getDistanceMap`).
+    /// Distance in pixels to the nearest depth change (the paper's T; PCL's `getDistanceMap`). Without any in the image:
+    /// width + height, with IINE_SEMANTICS_PAPER infinity.
     pub distances: *mut f32,
     /// Smoothing area map: the side of the pixel's window in pixels, or with IINE_SEMANTICS_PAPER its radius R
     /// (Eq. 8); 0 where there is none.

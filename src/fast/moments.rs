@@ -397,7 +397,7 @@ impl Sums for Moments {
     }
 }
 
-/// The covariance matrices of a run's windows (Eq. 25), over their traces, and the smallest eigenvalues.
+/// The covariance matrices of a run's windows (Eq. 16), over their traces, and the smallest eigenvalues.
 #[derive(Default)]
 pub(crate) struct Matrices {
     /// Those of a pair of groups: the second one's sums do not wait for what becomes of the first one's.

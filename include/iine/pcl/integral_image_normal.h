@@ -74,7 +74,7 @@ namespace iine
         COVARIANCE_MATRIX,    ///< eigenvector of the smallest eigenvalue of the covariance matrix; gives a curvature
         AVERAGE_3D_GRADIENT,  ///< cross product of the mean 3-D gradients
         AVERAGE_DEPTH_CHANGE, ///< cross product of smoothed depth changes
-        SIMPLE_3D_GRADIENT    ///< cross product of the differences of the outermost strips; not with MIRROR
+        SIMPLE_3D_GRADIENT    ///< cross product of the differences of the outermost strips; not with MIRROR or SEMANTICS_PAPER
       };
 
       /** \brief Whose definition of the windows and sums is followed. Not in PCL's class. */
@@ -168,7 +168,8 @@ namespace iine
       }
 
       /** \brief Set the factor f of the depth change threshold: neighbours whose z differ by more than
-        * 2 f (|z| + 1) are on different surfaces.
+        * 2 f (|z| + 1), z being that of the left or upper one, or of which one's z is not finite, are on different
+        * surfaces.
         * \param[in] max_depth_change_factor the factor, in the cloud's unit
         */
       void
@@ -177,7 +178,9 @@ namespace iine
         options_.max_depth_change_factor = max_depth_change_factor;
       }
 
-      /** \brief Set the side of the largest window without depth-dependent smoothing.
+      /** \brief Set the side of the largest window without depth-dependent smoothing. A pixel's window has the side
+        * min (distance to the nearest depth change, this), rounded down; where that minimum is not above 2 there is no
+        * normal, so that sizes up to 2 give none.
         * \param[in] normal_smoothing_size the side in pixels, finite and above 0; anything else is refused with a
         * printed error
         */
@@ -236,7 +239,8 @@ namespace iine
 
       /** \brief Get the distance of every pixel of the last computed cloud to the nearest depth change, in pixels.
         *
-        * It is computed by the first call after a compute, from the cloud as it is then.
+        * It is computed by the first call after a compute, from the cloud as it is then. Without any depth change in the
+        * image it is width + height, with SEMANTICS_PAPER infinity.
         * \return width * height values, row by row, valid until the next \ref setInputCloud or compute; null if there
         * has been no successful compute since \ref setInputCloud
         */
@@ -258,7 +262,9 @@ namespace iine
         * This map and those below are computed by the call, from the cloud as it is then and the options of the last
         * compute. They are those of the smoothing area map's own windows, whatever \ref setOneSidedWindows and
         * \ref setCreaseWindows say.
-        * \param[out] map width * height values, row by row: 1 at a depth change, else 0
+        * \param[out] map width * height values, row by row: 1 at a depth change, else 0. With SEMANTICS_PCL both pixels of a
+        * change are marked, and those at and beside a z that is not finite; with SEMANTICS_PAPER the pixel before the change
+        * (Eq. 7), and missing points are none
         * \return whether it was computed; if not (there has been no successful compute since \ref setInputCloud),
         * the map is empty and an error is printed
         */
@@ -445,8 +451,8 @@ namespace iine
         options_.zero_is_missing = zero_is_missing;
       }
 
-      /** \brief Set whether pixels near a depth change get a window of their own side, and with it a normal every pixel
-        * that has two neighbours on its surface not in line with it. With either semantics, and the alpha of
+      /** \brief Set whether pixels near a depth change get a window on their own side of it, so that every pixel with two
+        * neighbours on its surface that are not in line with it has a normal. With either semantics, and the alpha of
         * \ref setPaperAlpha and the largest radius of \ref setPaperRadii. Not in PCL's class.
         * \param[in] one_sided_windows whether they do; default false
         */

@@ -25,3 +25,8 @@ namespace pcl
   template <typename PointInT, typename PointOutT>
   using IntegralImageNormalEstimation = iine::IntegralImageNormalEstimation<PointInT, PointOutT>;
 }
+
+// As at the end of PCL's header.
+#ifdef PCL_NO_PRECOMPILE
+#include <pcl/features/impl/integral_image_normal.hpp>
+#endif
