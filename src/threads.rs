@@ -127,3 +127,26 @@ impl Drop for Workers {
         self.end();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Barrier;
+
+    use super::*;
+
+    #[test]
+    fn as_many_work_at_once_as_were_asked_for() {
+        let mut workers = Workers::default();
+        let all = std::thread::available_parallelism().unwrap().get();
+        for (asked, count) in [(1, 1), (3, 3), (0, all), (2, 2), (1, 1), (5, 5)] {
+            workers.prepare(asked).unwrap();
+            assert_eq!(workers.count(), count);
+            // None passes before all are there.
+            let barrier = Barrier::new(count);
+            workers.for_each(count, |worker, _| {
+                assert!(worker < count);
+                barrier.wait();
+            });
+        }
+    }
+}

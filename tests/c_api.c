@@ -123,11 +123,16 @@ static void test_version(void) {
 
 static void test_isa_name(void) {
   static const char *const names[] = {"avx512", "avx2", "sse2", "neon", "portable", "scalar"};
+  const char *const asked = getenv("IINE_ISA");
   size_t i, found = 0;
   for (i = 0; i < sizeof names / sizeof *names; ++i) {
     found += strcmp(iine_isa_name(), names[i]) == 0;
   }
   CHECK(found == 1);
+  /* What every processor has is taken if it is asked for. */
+  if (asked != NULL && (strcmp(asked, "portable") == 0 || strcmp(asked, "scalar") == 0)) {
+    CHECK(strcmp(iine_isa_name(), asked) == 0);
+  }
 }
 
 static void test_status_strings(void) {
@@ -136,12 +141,15 @@ static void test_status_strings(void) {
       IINE_ERROR_STRIDE,       IINE_ERROR_MISALIGNED,   IINE_ERROR_OVERLAP,      IINE_ERROR_OPTION_VALUE,
       IINE_ERROR_UNSUPPORTED,  IINE_ERROR_INDEX,        IINE_ERROR_OUT_OF_MEMORY, IINE_ERROR_THREADS,
       IINE_ERROR_INTERNAL};
+  static const char *const words[] = {"ok",     "NULL",  "struct_size", "width",  "stride",  "aligned", "overlap",
+                                      "option", "together", "index",    "memory", "threads", "internal"};
   const char *const unknown = iine_status_string(-1);
   int32_t i, j;
   CHECK(unknown[0] != '\0');
   CHECK(iine_status_string(INT32_MAX) == unknown && iine_status_string(INT32_MIN) == unknown);
   for (i = 0; i < (int32_t)(sizeof statuses / sizeof *statuses); ++i) {
     CHECK(statuses[i] == i);
+    CHECK(strstr(iine_status_string(i), words[i]) != NULL);
     CHECK(strcmp(iine_status_string(i), unknown) != 0);
     for (j = 0; j < i; ++j) {
       CHECK(strcmp(iine_status_string(i), iine_status_string(j)) != 0);
@@ -478,6 +486,7 @@ static void test_compute_refuses(void) {
   REFUSE_NORMALS(IINE_ERROR_MISALIGNED, out.nz = misaligned(out.nz));
   REFUSE_NORMALS(IINE_ERROR_MISALIGNED, out.curvature = misaligned(out.curvature));
 
+  REFUSE_POINTS(IINE_ERROR_SIZE, points.x = (const float *)(UINTPTR_MAX - 15)); /* the addresses end there */
   REFUSE_POINTS(IINE_ERROR_SIZE, points.width = 0);
   REFUSE_POINTS(IINE_ERROR_SIZE, points.height = 0);
   REFUSE_POINTS(IINE_ERROR_SIZE, (points.width = 65536, points.height = 32768));
@@ -559,6 +568,16 @@ static void test_indices(void) {
   STATUS(IINE_ERROR_INDEX, iine_estimator_compute_indices(e, &points, bad, COUNT, &to_some));
   STATUS(IINE_OK, iine_estimator_compute_indices(e, &points, indices, 0, &to_some));
   STATUS(IINE_OK, iine_estimator_compute_indices(e, &points, NULL, 0, &to_some));
+  STATUS(IINE_ERROR_NULL_POINTER, iine_estimator_compute_indices(e, NULL, NULL, 0, &to_some));
+  STATUS(IINE_OK, iine_estimator_compute_indices(e, &points, NULL, 0, NULL)); /* no outputs */
+  /* The next pixel's field, whichever of the two lies first. */
+  to_some.curvature = NULL;
+  to_some.nz = to_some.nx + 4;
+  STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_indices(e, &points, indices, COUNT, &to_some));
+  to_some.nx += 4;
+  to_some.nz = some;
+  STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_indices(e, &points, indices, COUNT, &to_some));
+  to_some = packed_normals(some);
   CHECK(memcmp(some, some_before, sizeof some) == 0);
 
   to_some.row_stride = to_some.curvature_row_stride = 1; /* not used */
@@ -614,11 +633,17 @@ static void test_window(void) {
   STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_window(e, &points, X, Y, 6, 6, &bad));
   CHECK(memcmp(one, one_before, sizeof one) == 0);
 
+  normal.row_stride = normal.curvature_row_stride = 1; /* not used */
   STATUS(IINE_OK, iine_estimator_compute_window(e, &points, X, Y, 6, 6, &normal));
   for (k = 0; k < 3; ++k) {
     CHECK(fabsf(one[k] - normals_out[4 * (Y * WIDTH + X) + k]) < 1e-5f);
   }
   CHECK(memcmp(one + 4, one_before + 4, 4 * sizeof(float)) == 0);
+  /* Width and height, which meet the step or do not. */
+  STATUS(IINE_OK, iine_estimator_compute_window(e, &points, WIDTH / 2 - 3, Y, 3, 13, &normal));
+  CHECK(one[0] > 0.9f);
+  STATUS(IINE_OK, iine_estimator_compute_window(e, &points, WIDTH / 2 - 3, Y, 13, 3, &normal));
+  CHECK(one[2] < one[0] && fabsf(one[0] - normals_out[4 * (Y * WIDTH + X)]) > 1e-3f);
   STATUS(IINE_OK, iine_estimator_compute_window(e, &points, 0, 0, INT32_MAX, INT32_MAX, &normal));
   STATUS(IINE_OK, iine_estimator_compute_window(e, &points, X, Y, 0, 0, &normal));
   CHECK(isnan(one[0]) && isnan(one[3]));
@@ -687,6 +712,14 @@ static void test_maps(void) {
   maps.depth_radii = distances;
   STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_maps(e, &points, &maps));
   maps = all;
+  maps.depth_radii = three;
+  maps.depth_changes = (uint8_t *)three + 2 * PIXELS;
+  STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_maps(e, &points, &maps));
+  maps = all;
+  maps.smoothing_areas = three;
+  maps.depth_changes = (uint8_t *)three + 2 * PIXELS;
+  STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_maps(e, &points, &maps));
+  maps = all;
   maps.depth_radii = misaligned(three);
   STATUS(IINE_ERROR_MISALIGNED, iine_estimator_compute_maps(e, &points, &maps));
   maps = all;
@@ -728,6 +761,27 @@ static void test_maps(void) {
   CHECK(memcmp(distances + PIXELS, untouched + PIXELS, sizeof(float)) == 0);
   CHECK(memcmp(areas + PIXELS, untouched + PIXELS, sizeof(float)) == 0);
   CHECK(memcmp(before, cloud, sizeof cloud) == 0);
+
+  /* Maps may touch each other and the points: here z, three maps and x end to end, and in the other order. */
+  {
+    static float planes[6 * PIXELS];
+    iine_points touching = points;
+    touching.point_stride = sizeof(float);
+    touching.y = planes;
+    touching.z = planes + PIXELS;
+    touching.x = planes + 5 * PIXELS;
+    maps = all;
+    maps.distances = planes + 2 * PIXELS;
+    maps.smoothing_areas = planes + 3 * PIXELS;
+    maps.depth_changes = (uint8_t *)(planes + 4 * PIXELS);
+    STATUS(IINE_OK, iine_estimator_compute_maps(e, &touching, &maps));
+    maps.smoothing_areas = planes + 2 * PIXELS;
+    maps.distances = planes + 3 * PIXELS;
+    maps.depth_changes = (uint8_t *)(planes + 5 * PIXELS) - PIXELS;
+    STATUS(IINE_OK, iine_estimator_compute_maps(e, &touching, &maps));
+    maps.depth_changes += 1;
+    STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_maps(e, &touching, &maps));
+  }
 
   /* A program made for the first version of the struct has no more fields: what lies there is not read. */
   maps = all;

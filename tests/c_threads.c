@@ -1,13 +1,15 @@
-/* The library's threads where it is unloaded and where the process is forked; the argument is its path. Each is tried
+/* The library's threads: how many, where it is unloaded and where the process is forked; the argument is its path. Each is tried
  * often: what goes wrong may do so now and then. Prints what failed; exits with 1 if anything did. */
 
 #define _POSIX_C_SOURCE 200809L
 
 #include <iine/iine.h>
 
+#include <dirent.h>
 #include <dlfcn.h>
 #include <pthread.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -55,6 +57,26 @@ static int release(iine_estimator *estimator) {
 static void end(iine_estimator *estimator) {
   FUNCTION(void, estimator_free, (iine_estimator *))
   estimator_free(estimator);
+}
+
+static int threads_of_process(void) {
+  DIR *const tasks = opendir("/proc/self/task");
+  int count = -2; /* . and .. */
+  if (tasks == NULL) return 0;
+  while (readdir(tasks) != NULL) ++count;
+  closedir(tasks);
+  return count;
+}
+
+/* The calling thread computes too; the plain form computes alone. */
+static int test_number(void) {
+  const char *const isa = getenv("IINE_ISA");
+  const int others = isa != NULL && strcmp(isa, "scalar") == 0 ? 0 : THREADS - 1;
+  const int before = threads_of_process();
+  iine_estimator *const estimator = new_estimator();
+  const int passed = compute(estimator) && threads_of_process() == before + others;
+  end(estimator);
+  return passed && threads_of_process() == before;
 }
 
 /* What is thread-local in the library would keep it loaded while the thread lasts that used it. */
@@ -124,6 +146,7 @@ int main(int count, char **arguments) {
   failures += failed("unloading", test_unloading(arguments[1]));
   library = dlopen(arguments[1], RTLD_NOW | RTLD_LOCAL);
   if (library == NULL) return 1;
+  failures += failed("as many threads as were asked for", test_number());
   failures += failed("releasing scratch memory in a fork", test_fork(release_and_exit));
   failures += failed("freeing in a fork", test_fork(free_and_exit));
   return failures > 0;

@@ -654,3 +654,25 @@ fn points_and_normals_may_share_an_array() {
         }
     }
 }
+
+/// A surface that is seen exactly edge-on keeps the side that the method gives, as in PCL: AVERAGE_DEPTH_CHANGE's is the other.
+#[test]
+fn edge_on_normals_are_not_turned() {
+    let (width, height) = (40, 30);
+    let point = |i: usize| [(i % width) as f32 * 0.25, (i / width) as f32 * 0.25, 1.0];
+    let points = (0..width * height).map(point).collect();
+    let cloud = Cloud { width, height, points };
+    for (method, z) in [
+        (Method::Average3DGradient, -1.0),
+        (Method::Simple3DGradient, -1.0),
+        (Method::AverageDepthChange, 1.0),
+    ] {
+        let mut options = options((method, BorderPolicy::Ignore), 6.0, false);
+        options.viewpoint = [3.0, 2.0, 1.0];
+        for isa in Isa::ALL {
+            let found = compute(&mut Estimator::with_isa(options.clone(), isa), &cloud);
+            let normal = &found[12 * width + 20][..3];
+            assert_eq!(normal, [0.0, 0.0, z], "{method:?} {isa:?}");
+        }
+    }
+}

@@ -162,6 +162,25 @@ fn maps_that_do_not_go_together_are_refused() {
     }
 }
 
+/// The ignored border is the smoothing size rounded down.
+#[test]
+fn the_ignored_border_is_of_whole_pixels() {
+    let (width, height) = (30, 24);
+    let cloud = Cloud::new(Kind::Plane, width, height, 1);
+    for (size, border) in [(7.0, 7), (7.5, 7), (7.999, 7), (8.0, 8)] {
+        let mut areas = vec![0.0; width * height];
+        let mut maps = Maps { smoothing_areas: Some(&mut areas), ..Maps::default() };
+        let options = options((Method::default(), BorderPolicy::Ignore), size, false);
+        Estimator::new(options).compute_maps(&cloud.view(), &mut maps).unwrap();
+        for (at, area) in areas.into_iter().enumerate() {
+            let (x, y) = (at % width, at / width);
+            let inside =
+                (border..width - border).contains(&x) && (border..height - border).contains(&y);
+            assert_eq!(area > 0.0, inside, "{size}: {x} {y}");
+        }
+    }
+}
+
 #[test]
 fn zeros_that_are_missing_are_as_nan() {
     for seed in 0..6 {

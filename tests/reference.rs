@@ -4,7 +4,7 @@
 mod clouds;
 
 use clouds::{Cloud, Kind, angle, compute, methods, normal, options};
-use iine::{BorderPolicy, Estimator, Maps, Method, Options};
+use iine::{BorderPolicy, Estimator, Maps, Method, Normals, Options};
 use iine_scenes::{REAL_FRAMES, real_frame};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
@@ -17,24 +17,37 @@ struct Expected {
 /// A plane is defined where the middle eigenvalue is this many times the smallest.
 const DEFINED: f64 = 1.01;
 
-/// The reference for pixel (x, y) with a window of `side`; none where it has nothing to say: the window crosses the
-/// border of the image, or its points define no plane.
+/// Whether a window around pixel (x, y), and what is next to it, lies inside the image.
+fn is_inside(cloud: &Cloud, (x, y): (usize, usize), (width, height): (usize, usize)) -> bool {
+    let (reach_x, reach_y) = (width / 2 + 2, height / 2 + 2);
+    x >= reach_x && y >= reach_y && x + reach_x < cloud.width && y + reach_y < cloud.height
+}
+
+/// The reference for pixel (x, y) with a window of a size, clipped at the border of the image; none where it has nothing
+/// to say: the points define no plane, or the window crosses the border and is of several parts.
 fn reference(
     cloud: &Cloud,
     method: Method,
-    (x, y): (usize, usize),
-    side: usize,
+    pixel: (usize, usize),
+    (width, height): (usize, usize),
 ) -> Option<Expected> {
-    let half = side / 2;
-    let reach = half + 2;
-    if x < reach || y < reach || x + reach >= cloud.width || y + reach >= cloud.height {
+    let in_parts = matches!(method, Method::AverageDepthChange | Method::Simple3DGradient);
+    if in_parts && !is_inside(cloud, pixel, (width, height)) {
         return None;
     }
-    let at = |x: usize, y: usize| {
-        let point = Vector3::from(cloud.points[y * cloud.width + x].map(f64::from));
-        point.iter().all(|c| c.is_finite()).then_some(point)
+    let (x, y) = (pixel.0 as isize, pixel.1 as isize);
+    let (half_x, half_y) = ((width / 2) as isize, (height / 2) as isize);
+    let (columns, rows) = (0..cloud.width as isize, 0..cloud.height as isize);
+    let z = |x: isize, y: isize| f64::from(cloud.points[y as usize * cloud.width + x as usize][2]);
+    let at = |x: isize, y: isize| {
+        if !columns.contains(&x) || !rows.contains(&y) {
+            return None;
+        }
+        let point = cloud.points[y as usize * cloud.width + x as usize];
+        point.iter().all(|c| c.is_finite()).then(|| Vector3::from(point.map(f64::from)))
     };
-    let (left, top) = (x - half, y - half);
+    let (left, top) = (x - half_x, y - half_y);
+    let (right, bottom) = (left + width as isize, top + height as isize);
     let tangents = |horizontal: Vector3<f64>, vertical: Vector3<f64>| {
         let sine = horizontal.cross(&vertical).norm() / (horizontal.norm() * vertical.norm());
         // A thousandth of a degree between the tangents: no plane.
@@ -43,9 +56,8 @@ fn reference(
     };
     match method {
         Method::CovarianceMatrix => {
-            let points: Vec<Vector3<f64>> = (top..top + side)
-                .flat_map(|y| (left..left + side).filter_map(move |x| at(x, y)))
-                .collect();
+            let points: Vec<Vector3<f64>> =
+                (top..bottom).flat_map(|y| (left..right).filter_map(move |x| at(x, y))).collect();
             let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
             let mut matrix = Matrix3::zeros();
             for point in &points {
@@ -65,8 +77,9 @@ fn reference(
         }
         Method::Average3DGradient => {
             let (mut horizontal, mut vertical) = (Vector3::zeros(), Vector3::zeros());
-            for y in top..top + side {
-                for x in left..left + side {
+            // None in the outermost rows and columns, as in PCL.
+            for y in top.max(1)..bottom.min(rows.end - 1) {
+                for x in left.max(1)..right.min(columns.end - 1) {
                     if let (Some(a), Some(b)) = (at(x + 1, y), at(x - 1, y)) {
                         horizontal += a - b;
                     }
@@ -78,14 +91,13 @@ fn reference(
             tangents(horizontal, vertical)
         }
         Method::AverageDepthChange => {
-            let quarter = side / 4;
-            let mean_z = |left: usize, top: usize| {
+            let (quarter_x, quarter_y) = ((width / 4) as isize, (height / 4) as isize);
+            let mean_z = |left: isize, top: isize| {
                 let (mut sum, mut count) = (0.0, 0.0);
-                for y in top..top + half {
-                    for x in left..left + half {
-                        let z = f64::from(cloud.points[y * cloud.width + x][2]);
-                        if z.is_finite() {
-                            sum += z;
+                for y in top..top + half_y {
+                    for x in left..left + half_x {
+                        if z(x, y).is_finite() {
+                            sum += z(x, y);
                             count += 1.0;
                         }
                     }
@@ -93,20 +105,19 @@ fn reference(
                 sum / count
             };
             // Windows of 3 are rounded as PCL rounds them.
-            if half == 1 {
+            if (half_x, half_y) == (1, 1) {
                 return None;
             }
-            let mut horizontal = at(x + quarter + 1, y)? - at(x - quarter - 1, y)?;
-            let mut vertical = at(x + 1, y + quarter)? - at(x - 1, y - quarter)?;
-            horizontal.z = mean_z(x + 1, y - quarter) - mean_z(left, y - quarter);
-            vertical.z = mean_z(x - quarter, y + 1) - mean_z(x - quarter, top);
+            let mut horizontal = at(x + quarter_x + 1, y)? - at(x - quarter_x - 1, y)?;
+            let mut vertical = at(x + 1, y + quarter_y)? - at(x - 1, y - quarter_y)?;
+            horizontal.z = mean_z(x + 1, y - quarter_y) - mean_z(left, y - quarter_y);
+            vertical.z = mean_z(x - quarter_x, y + 1) - mean_z(x - quarter_x, top);
             tangents(horizontal, vertical)
         }
         Method::Simple3DGradient => {
-            let (right, bottom) = (x + half, y + half);
-            let column = |x| (top..top + side).filter_map(|y| at(x, y)).sum::<Vector3<f64>>();
-            let row = |y| (left..left + side).filter_map(|x| at(x, y)).sum::<Vector3<f64>>();
-            tangents(column(right) - column(left), row(bottom) - row(top))
+            let column = |x| (top..bottom).filter_map(|y| at(x, y)).sum::<Vector3<f64>>();
+            let row = |y| (left..right).filter_map(|x| at(x, y)).sum::<Vector3<f64>>();
+            tangents(column(x + half_x) - column(left), row(y + half_y) - row(top))
         }
         _ => None,
     }
@@ -135,9 +146,11 @@ impl Differences {
                 continue;
             }
             let pixel = (at % cloud.width, at / cloud.width);
-            let Some(expected) = reference(cloud, options.method, pixel, sides[at] as usize) else {
+            let size = (sides[at] as usize, sides[at] as usize);
+            if !is_inside(cloud, pixel, size) {
                 continue;
-            };
+            }
+            let Some(expected) = reference(cloud, options.method, pixel, size) else { continue };
             let Some(normal) = normal(&found[at]) else {
                 self.missing += 1;
                 continue;
@@ -193,6 +206,58 @@ fn generated_clouds_match_the_reference() {
             }
             differences.check(&format!("{kind:?} {method:?}"), method.0);
         }
+    }
+}
+
+/// Windows of the caller's choice: oblong ones, and such as are clipped at the border. The viewpoint decides the side.
+#[test]
+fn chosen_windows_match_the_reference() {
+    let sizes = [(3, 9), (9, 3), (12, 2), (2, 12), (9, 4), (4, 9), (5, 5), (40, 7)];
+    let cloud = Cloud::new(Kind::NanPixels, 41, 33, 3);
+    let (width, height) = (cloud.width, cloud.height);
+    for method in methods() {
+        let mut compared = [0; 2];
+        for size in sizes {
+            for pixel in (0..width * height).step_by(7).map(|at| (at % width, at / width)) {
+                let inside = is_inside(&cloud, pixel, size);
+                if !inside && method.1 == BorderPolicy::Mirror {
+                    continue;
+                }
+                let Some(expected) = reference(&cloud, method.0, pixel, size) else { continue };
+                let towards = |viewpoint: [f32; 3]| {
+                    let mut options = options(method, 10.0, false);
+                    options.viewpoint = viewpoint;
+                    let mut found = [0.0; 4];
+                    let mut normal = Normals::interleaved(&mut found, 1, 1, 4, 0, Some(3)).unwrap();
+                    let rect = (size.0 as u32, size.1 as u32);
+                    let mut estimator = Estimator::new(options);
+                    estimator.compute_window(&cloud.view(), pixel, rect, &mut normal).unwrap();
+                    found
+                };
+                let found = towards([0.0; 3]);
+                let what = format!("{method:?} {size:?} {pixel:?}: {found:?}");
+                let normal = normal(&found).expect(&what);
+                let degrees = angle(normal, expected.normal.into());
+                assert!(degrees.min(180.0 - degrees) < 1e-4, "{what}, not {}", expected.normal);
+                if let Some(curvature) = expected.curvature {
+                    assert!((f64::from(found[3]) - curvature).abs() < 1e-6, "{what}");
+                }
+                compared[usize::from(inside)] += 1;
+
+                let point = cloud.points[pixel.1 * width + pixel.0];
+                if point.iter().all(|c| c.is_finite()) {
+                    let cosine: f64 = (0..3).map(|c| normal[c] * f64::from(point[c])).sum();
+                    assert!(cosine <= 1e-6, "{what}");
+                    let from_behind = point.map(|c| 2.0 * c);
+                    let [x, y, z, _] = towards(from_behind);
+                    let other = [-x, -y, -z, found[3]].map(f32::to_bits);
+                    assert!(cosine > -1e-6 || other == found.map(f32::to_bits), "{what}");
+                }
+            }
+        }
+        let in_parts = matches!(method.0, Method::AverageDepthChange | Method::Simple3DGradient);
+        let is_clipped = method.1 == BorderPolicy::Ignore && !in_parts;
+        assert!(compared[1] > 500 && (compared[0] > 100) == is_clipped, "{method:?} {compared:?}");
     }
 }
 

@@ -77,3 +77,15 @@ pub(super) unsafe fn read_sized<T: Sized + Copy>(
         Ok(value.assume_init())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outcomes_become_statuses() {
+        assert_eq!(guard(|| Ok(())), IINE_OK);
+        assert_eq!(guard(|| Err(Error::Overlap)), Error::Overlap as i32);
+        assert_eq!(guard(|| panic!("on purpose")), Error::Internal as i32);
+    }
+}

@@ -14,22 +14,14 @@ pub(crate) fn estimate(
     (x, y): (usize, usize),
     (width, height): (usize, usize),
 ) -> Estimate {
-    let mut horizontal = Gradient::default();
-    let mut vertical = Gradient::default();
+    let (mut horizontal, mut vertical) = ([0.0; 3], [0.0; 3]);
     for (rect, _) in image.rects((start(x, width), start(y, height)), (width, height)) {
-        let inside = image.inside_frame(&rect);
-        let frame = rect.area() - inside.area();
-        horizontal.count += frame;
-        vertical.count += frame;
-        for (x, y) in inside.pixels() {
-            horizontal.add(points.at(x + 1, y), points.at(x - 1, y));
-            vertical.add(points.at(x, y + 1), points.at(x, y - 1));
+        for (x, y) in image.inside_frame(&rect).pixels() {
+            add(&mut horizontal, points.at(x + 1, y), points.at(x - 1, y));
+            add(&mut vertical, points.at(x, y + 1), points.at(x, y - 1));
         }
     }
-    if horizontal.count == 0 || vertical.count == 0 {
-        return Estimate::NONE;
-    }
-    normal_of_tangents(vertical.sum, horizontal.sum)
+    normal_of_tangents(vertical, horizontal)
 }
 
 /// The same of a window that, with the pixels around it, lies inside the image and holds finite points only: over a row or
@@ -37,32 +29,23 @@ pub(crate) fn estimate(
 pub(crate) fn estimate_of_finite(points: &Points, (x, y): (usize, usize), side: usize) -> Estimate {
     let (left, top) = (x - side / 2, y - side / 2);
     let (right, bottom) = (left + side, top + side);
-    let (mut horizontal, mut vertical) = (Gradient::default(), Gradient::default());
+    let (mut horizontal, mut vertical) = ([0.0; 3], [0.0; 3]);
     for ahead in [0, 1] {
         for y in top..bottom {
-            horizontal.add(points.at(right - ahead, y), points.at(left - ahead, y));
+            add(&mut horizontal, points.at(right - ahead, y), points.at(left - ahead, y));
         }
         for x in left..right {
-            vertical.add(points.at(x, bottom - ahead), points.at(x, top - ahead));
+            add(&mut vertical, points.at(x, bottom - ahead), points.at(x, top - ahead));
         }
     }
-    normal_of_tangents(vertical.sum, horizontal.sum)
+    normal_of_tangents(vertical, horizontal)
 }
 
-/// A sum of differences and how many there are.
-#[derive(Default)]
-struct Gradient {
-    sum: [f64; 3],
-    count: usize,
-}
-
-impl Gradient {
-    fn add(&mut self, ahead: [f32; 3], behind: [f32; 3]) {
-        if is_finite(ahead) && is_finite(behind) {
-            for i in 0..3 {
-                self.sum[i] += f64::from(ahead[i]) - f64::from(behind[i]);
-            }
-            self.count += 1;
+/// Adds the difference between two points to a sum, if both are there.
+fn add(sum: &mut [f64; 3], ahead: [f32; 3], behind: [f32; 3]) {
+    if is_finite(ahead) && is_finite(behind) {
+        for i in 0..3 {
+            sum[i] += f64::from(ahead[i]) - f64::from(behind[i]);
         }
     }
 }
