@@ -1,6 +1,7 @@
 // What callers of PCL's class rely on, and what iine's class adds.
 
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -8,6 +9,8 @@
 #include <type_traits>
 #include <utility>
 #include <vector>
+
+#include <dirent.h>
 
 #include <gtest/gtest.h>
 
@@ -60,6 +63,51 @@ namespace
     estimator.setNormalSmoothingSize (size);
     estimator.setInputCloud (cloud);
     return compute (estimator);
+  }
+
+  /** \brief The normal of a pixel of the scene from a window of this size, by the C API. */
+  pcl::Normal
+  chosenWindow (Estimator::NormalEstimationMethod method, std::uint32_t x, std::uint32_t y, std::int32_t width,
+                std::int32_t height)
+  {
+    const Cloud::Ptr cloud = scene ();
+    pcl::Normal normal;
+    iine_points points = {};
+    points.struct_size = sizeof (points);
+    points.width = cloud->width;
+    points.height = cloud->height;
+    points.x = &cloud->front ().x;
+    points.y = &cloud->front ().y;
+    points.z = &cloud->front ().z;
+    points.point_stride = sizeof (pcl::PointXYZ);
+    iine_normals normals = {};
+    normals.struct_size = sizeof (normals);
+    normals.nx = &normal.normal_x;
+    normals.ny = &normal.normal_y;
+    normals.nz = &normal.normal_z;
+    normals.point_stride = sizeof (pcl::Normal);
+    normals.curvature = &normal.curvature;
+    normals.curvature_point_stride = sizeof (pcl::Normal);
+    iine_estimator *estimator = nullptr;
+    EXPECT_EQ (iine_estimator_new (&estimator), IINE_OK);
+    EXPECT_EQ (iine_estimator_set_method (estimator, method), IINE_OK);
+    EXPECT_EQ (iine_estimator_compute_window (estimator, &points, x, y, width, height, &normals), IINE_OK);
+    iine_estimator_free (estimator);
+    return normal;
+  }
+
+  /** \brief How many threads the process has. */
+  std::size_t
+  countThreads ()
+  {
+    DIR *const tasks = opendir ("/proc/self/task");
+    if (tasks == nullptr)
+      return 0;
+    std::size_t count = 0;
+    while (readdir (tasks) != nullptr)
+      ++count;
+    closedir (tasks);
+    return count - 2; // . and ..
   }
 
   /** \brief A search tree that says whether anyone gave it a cloud. */
@@ -130,11 +178,21 @@ TEST (Interface, DefaultsArePcls)
   chosen.setNormalSmoothingSize (10.0f);
   chosen.setMaxDepthChangeFactor (20.0f * 0.001f);
   Estimator plain;
-  chosen.setInputCloud (scene ());
-  plain.setInputCloud (scene ());
-  const Normals normals = compute (plain);
-  EXPECT_TRUE (areEqual (normals, compute (chosen)));
-  EXPECT_GT (countNormals (normals), 100u);
+  // Steps up and down by nearly the depth that is a change with the default factor, 2 * 0.02 * (1.5 + 1), and by more.
+  const Cloud::Ptr stairs = scene (180, 60, 0.0f);
+  for (int i = 0; i < 180 * 60; ++i)
+    (*stairs)[i].z = 1.5f + (i % 180 / 20 % 2 == 0 ? 0.0f : 0.0976f + 0.0008f * static_cast<float> (i % 180 / 20));
+  for (const Cloud::Ptr &cloud : {scene (), stairs})
+  {
+    chosen.setInputCloud (cloud);
+    plain.setInputCloud (cloud);
+    const Normals normals = compute (plain);
+    EXPECT_TRUE (areEqual (normals, compute (chosen)));
+    EXPECT_GT (countNormals (normals), 100u);
+  }
+  // The first step up, 0.0984, is none; the last one, 0.1032, is one.
+  EXPECT_GT (plain.getDistanceMap ()[30 * 180 + 20], 5.0f);
+  EXPECT_EQ (plain.getDistanceMap ()[30 * 180 + 140], 0.0f);
 }
 
 TEST (Interface, WorksThroughAFeaturePointer)
@@ -382,10 +440,13 @@ TEST (Errors, RefusedSmoothingSizesLeaveTheOldOne)
 TEST (Errors, UnknownEnumeratorsThrowInSetInputCloud)
 {
   Estimator estimator;
-  estimator.setNormalEstimationMethod (static_cast<Estimator::NormalEstimationMethod> (4));
-  EXPECT_THROW (estimator.setInputCloud (scene ()), pcl::InitFailedException);
-  EXPECT_EQ (countNormals (compute (estimator)), 0u);
-  EXPECT_EQ (estimator.getLastStatus (), IINE_ERROR_OPTION_VALUE);
+  for (int method : {-1, 4})
+  {
+    estimator.setNormalEstimationMethod (static_cast<Estimator::NormalEstimationMethod> (method));
+    EXPECT_THROW (estimator.setInputCloud (scene ()), pcl::InitFailedException);
+    EXPECT_EQ (countNormals (compute (estimator)), 0u);
+    EXPECT_EQ (estimator.getLastStatus (), IINE_ERROR_OPTION_VALUE);
+  }
   estimator.setNormalEstimationMethod (Estimator::AVERAGE_3D_GRADIENT);
   estimator.setBorderPolicy (static_cast<Estimator::BorderPolicy> (2));
   EXPECT_THROW (estimator.setInputCloud (scene ()), pcl::InitFailedException);
@@ -435,6 +496,11 @@ TEST (Viewpoint, IsReadWhereTheCloudIsSetOrAskedFor)
   estimator.setInputCloud (cloud);
   EXPECT_EQ (get (), Eigen::Vector3f (4, 5, 60));
   EXPECT_EQ (compute (estimator)[center].normal_z, from_behind[center].normal_z);
+  estimator.useSensorOriginAsViewPoint ();
+  const Cloud::Ptr later = scene ();
+  later->sensor_origin_ = Eigen::Vector4f (7.0f, 8.0f, 9.0f, 0.0f);
+  estimator.setInputCloud (later);
+  EXPECT_EQ (get (), Eigen::Vector3f (7, 8, 9));
   Estimator without_cloud;
   without_cloud.setViewPoint (1, 1, 1);
   without_cloud.useSensorOriginAsViewPoint ();
@@ -489,6 +555,8 @@ TEST (PointNormal, UsesTheRectangleAndComputeDoesNot)
     pcl::Normal other;
     estimator.computePointNormal (25, 15, 15 * 60 + 25, other);
     EXPECT_FALSE (areSame (normal, other)) << "compute has left the rectangle alone";
+    EXPECT_TRUE (areSame (other, chosenWindow (method, 25, 15, 9, 4))) << "width and height";
+    EXPECT_FALSE (areSame (other, chosenWindow (method, 25, 15, 4, 9)));
     if (method != Estimator::SIMPLE_3D_GRADIENT)
     {
       estimator.computePointNormalMirror (0, 0, 0, other);
@@ -531,14 +599,18 @@ TEST (Copies, WorkInThreadsAtTheSameTime)
   original.setInputCloud (scene ());
   const Normals expected = compute (original);
   std::vector<Estimator> estimators (4, original);
+  // Every second one with a cloud of another size: the copies' lists of indices are their own.
+  const Normals expected_of_other = computeFresh (scene (30, 70), Estimator::AVERAGE_3D_GRADIENT);
+  for (std::size_t i = 1; i < estimators.size (); i += 2)
+    estimators[i].setInputCloud (scene (30, 70));
   std::vector<Normals> results (estimators.size ());
   std::vector<std::thread> threads;
   for (std::size_t i = 0; i < estimators.size (); ++i)
     threads.emplace_back ([&, i] () { estimators[i].compute (results[i]); });
   for (auto &thread : threads)
     thread.join ();
-  for (const Normals &result : results)
-    EXPECT_TRUE (areEqual (result, expected));
+  for (std::size_t i = 0; i < results.size (); ++i)
+    EXPECT_TRUE (areEqual (results[i], i % 2 == 0 ? expected : expected_of_other)) << i;
 }
 
 TEST (Threads, DoNotChangeTheResult)
@@ -556,6 +628,14 @@ TEST (Threads, DoNotChangeTheResult)
     }
   }
   Estimator estimator;
+  const std::size_t before = countThreads ();
+  estimator.setNumberOfThreads (3);
+  estimator.setInputCloud (scene ());
+  compute (estimator);
+  EXPECT_EQ (countThreads (), before + 2) << "the calling thread computes too";
+  estimator.setNumberOfThreads (1);
+  compute (estimator);
+  EXPECT_EQ (countThreads (), before);
   estimator.setNumberOfThreads (5000); // refused
   estimator.setInputCloud (scene ());
   EXPECT_TRUE (areEqual (compute (estimator), computeFresh (scene (), Estimator::AVERAGE_3D_GRADIENT)));
@@ -570,6 +650,10 @@ TEST (SearchTree, IsNeitherBuiltNorUsed)
   EXPECT_EQ (estimator.getSearchMethod (), nullptr);
   EXPECT_EQ (estimator.getSearchSurface (), nullptr);
   EXPECT_EQ (estimator.getSearchParameter (), 1.0);
+  estimator.setKSearch (0);
+  estimator.setRadiusSearch (0.03);
+  compute (estimator);
+  EXPECT_EQ (estimator.getSearchParameter (), 0.03);
   const std::shared_ptr<WatchedTree> tree (new WatchedTree);
   estimator.setSearchMethod (tree);
   EXPECT_GT (countNormals (compute (estimator)), 100u);

@@ -67,7 +67,7 @@ namespace cross_check
   {
     std::vector<Config> result;
     const std::vector<float> sizes = isQuick () ? std::vector<float> {5.0f, 20.0f}
-                                                : std::vector<float> {3.0f, 5.0f, 7.0f, 10.0f, 20.0f, 40.0f};
+                                                : std::vector<float> {3.0f, 5.0f, 7.0f, 7.5f, 10.0f, 20.0f, 40.0f};
     for (int method = 0; method < 4; ++method)
       for (bool mirror : {false, true})
         for (bool depth_dependent : {false, true})

@@ -676,3 +676,19 @@ fn edge_on_normals_are_not_turned() {
         }
     }
 }
+
+/// Windows of one point, and beside them, in the same lanes, windows whose points lie on a line: both are left to the end.
+#[test]
+fn windows_of_one_point_are_told_from_their_neighbours() {
+    let (width, height) = (90, 40);
+    let point = |i: usize| [0.3 + 0.01 * (i % width).saturating_sub(44) as f32, 0.2, 1.0];
+    let points = (0..width * height).map(point).collect();
+    let cloud = Cloud { width, height, points };
+    let mut worst = Worst::default();
+    for method in methods() {
+        worst.check(&cloud, "a point and a line", &options(method, 6.0, false));
+    }
+    for options in paper_options() {
+        worst.check(&cloud, "a point and a line", &options);
+    }
+}

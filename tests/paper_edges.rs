@@ -166,6 +166,136 @@ fn exact_depths_have_exact_normals_up_to_the_edges() {
     }
 }
 
+/// Mean and largest angle to the truth over the points with a normal, of which there must be some, away from those that
+/// `is_spoilt` tells of.
+fn errors(frame: &Frame, normals: &[[f32; 3]], is_spoilt: impl Fn(usize) -> bool) -> [f64; 2] {
+    let (mut sum, mut largest, mut found) = (0.0, 0.0_f64, 0.0);
+    for (at, normal) in normals.iter().enumerate() {
+        if frame.points[at][2].is_nan() || is_spoilt(at) || normal[0].is_nan() {
+            continue;
+        }
+        let truth = frame.normals[at];
+        let cosine: f64 = (0..3).map(|i| f64::from(normal[i]) * f64::from(truth[i])).sum();
+        let degrees = cosine.clamp(-1.0, 1.0).acos().to_degrees();
+        (sum, largest, found) = (sum + degrees, largest.max(degrees), found + 1.0);
+    }
+    assert!(found > 1000.0, "{found} points");
+    [sum / found, largest]
+}
+
+/// Zeros that count as points are a surface of their own: those around them get windows without them.
+#[test]
+fn zeros_spoil_no_window_elsewhere() {
+    let (mut frame, _) = frame("box", [160.0, 160.0], Noise::None);
+    let width = frame.width();
+    let is_zero = |at: usize| at % width % 24 < 5 && at / width % 24 < 5;
+    for at in (0..frame.points.len()).filter(|at| is_zero(*at)) {
+        frame.points[at] = [0.0; 3];
+    }
+    for semantics in Semantics::ALL {
+        for creases in [false, true] {
+            let mut options = options(Method::CovarianceMatrix, true, creases);
+            options.semantics = semantics;
+            let normals = normals(&frame.points, width, options);
+            let [mean, _] = errors(&frame, &normals, is_zero);
+            println!("{semantics:?} {creases}: {mean:.2} deg");
+            assert!(mean < 1.0, "{semantics:?} {creases}: {mean}");
+        }
+    }
+}
+
+/// The middle pixels of the blocks that the second pass looks at tell much; where they are missing, others do.
+#[test]
+fn missing_points_spoil_no_window_elsewhere() {
+    for (name, bound) in [("tabletop", 3.3), ("crease-90", 1.6)] {
+        let (mut frame, _) = frame(name, [160.0, 120.0], Noise::Nguyen);
+        let width = frame.width();
+        let is_middle = |at: usize| at % width % 4 == 2 && at / width % 4 == 2;
+        for at in (0..frame.points.len()).filter(|at| is_middle(*at)) {
+            frame.points[at] = [f32::NAN; 3];
+        }
+        for method in [Method::CovarianceMatrix, Method::Average3DGradient] {
+            for semantics in Semantics::ALL {
+                for one_sided in [false, true] {
+                    let mut options = options(method, one_sided, true);
+                    options.semantics = semantics;
+                    let normals = normals(&frame.points, width, options);
+                    let [mean, _] = errors(&frame, &normals, |_| false);
+                    let what = format!("{name} {method:?} {semantics:?} {one_sided}");
+                    println!("{what}: {mean:.2} deg");
+                    assert!(mean < bound, "{what}: {mean}");
+                }
+            }
+        }
+    }
+}
+
+/// Gaps in a slanted plane are no depth changes.
+#[test]
+fn gaps_in_a_plane_are_no_edges() {
+    let (mut frame, _) = frame("plane", [320.0, 120.0], Noise::None);
+    let width = frame.width();
+    for at in 0..frame.points.len() {
+        if at % width % 16 < 4 {
+            frame.points[at] = [f32::NAN; 3];
+        }
+    }
+    for semantics in Semantics::ALL {
+        let mut options = options(Method::CovarianceMatrix, true, false);
+        options.semantics = semantics;
+        let normals = normals(&frame.points, width, options);
+        let [mean, largest] = errors(&frame, &normals, |_| false);
+        println!("{semantics:?}: {mean:.5} deg, {largest:.5}");
+        assert!(largest < 0.1, "{semantics:?}: {largest}");
+    }
+}
+
+#[test]
+fn normals_point_to_the_viewpoint() {
+    let (frame, _) = frame("tabletop", [200.0, 120.0], Noise::Khoshelham);
+    for viewpoint in [[0.0; 3], [0.5, -1.0, 0.25], [0.0, 0.0, 50.0]] {
+        for semantics in Semantics::ALL {
+            for method in [Method::CovarianceMatrix, Method::AverageDepthChange] {
+                let mut options = options(method, true, true);
+                (options.semantics, options.viewpoint) = (semantics, viewpoint);
+                let normals = normals(&frame.points, frame.width(), options);
+                let mut found = 0;
+                for (normal, point) in normals.iter().zip(&frame.points) {
+                    let to_viewpoint = |c: usize| f64::from(viewpoint[c] - point[c]);
+                    let cosine: f64 = (0..3).map(|c| to_viewpoint(c) * f64::from(normal[c])).sum();
+                    // Beyond rounding.
+                    assert!(
+                        cosine.is_nan() || cosine > -1e-5,
+                        "{semantics:?} {method:?} {point:?}"
+                    );
+                    found += usize::from(!cosine.is_nan());
+                }
+                assert!(found > 10_000);
+            }
+        }
+    }
+}
+
+/// Depths below 0 are as those above.
+#[test]
+fn behind_the_camera_normals_are_mirrored() {
+    let (frame, _) = frame("tabletop", [200.0, 120.0], Noise::Nguyen);
+    let width = frame.width();
+    let mirrored: Vec<_> = frame.points.iter().map(|[x, y, z]| [*x, *y, -z]).collect();
+    for semantics in Semantics::ALL {
+        let mut options = options(Method::CovarianceMatrix, true, true);
+        options.semantics = semantics;
+        let expected = normals(&frame.points, width, options.clone());
+        let found = normals(&mirrored, width, options);
+        let mut differing = 0;
+        for ([x, y, z], expected) in found.into_iter().zip(expected) {
+            let is_same = |(a, b): (f32, f32)| (a - b).abs() < 1e-3 || a.is_nan() && b.is_nan();
+            differing += usize::from(![x, y, -z].into_iter().zip(expected).all(is_same));
+        }
+        assert_eq!(differing, 0, "{semantics:?}");
+    }
+}
+
 #[test]
 fn almost_every_point_of_a_real_frame_has_a_normal() {
     for name in REAL_FRAMES {

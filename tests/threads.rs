@@ -15,9 +15,10 @@ use iine::{BorderPolicy, DistanceMetric, Error, Estimator, Isa, Method, Normals,
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
+    static HELD: Cell<usize> = const { Cell::new(0) };
 }
 
-/// Counts what each thread asks for.
+/// Counts how often each thread asks for memory, and how many bytes it holds (those that another one frees stay).
 struct Counting;
 
 // SAFETY: everything is the system allocator's.
@@ -25,11 +26,13 @@ unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // A thread that ends may ask after its counter is gone.
         let _ = ALLOCATIONS.try_with(|count| count.set(count.get() + 1));
+        let _ = HELD.try_with(|held| held.set(held.get().wrapping_add(layout.size())));
         // SAFETY: as the caller's.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        let _ = HELD.try_with(|held| held.set(held.get().wrapping_sub(layout.size())));
         // SAFETY: as the caller's.
         unsafe { System.dealloc(at, layout) }
     }
@@ -67,7 +70,8 @@ fn the_number_of_threads_does_not_matter() {
     }
 }
 
-/// Rows swept for their neighbours only do not know of all depth changes: their windows look larger than any is.
+/// Rows swept for their neighbours only do not know of all depth changes: their windows look larger than any is. And what is
+/// above a gap in the columns counts below it, in whatever thread's rows it ends.
 #[test]
 fn where_depth_changes_are_far_away_the_number_of_threads_does_not_matter_either() {
     let (width, height) = (300, 600);
@@ -75,14 +79,18 @@ fn where_depth_changes_are_far_away_the_number_of_threads_does_not_matter_either
     for (at, point) in cloud.points.iter_mut().enumerate() {
         point[2] += (at / width / 23 % 2) as f32;
     }
+    let mut with_gap = cloud.clone();
+    with_gap.fill(40..80, 150..450, [f32::NAN; 3]);
     let mut all = paper_options();
     all.extend(edge_options());
-    for mut options in all {
+    for (mut options, cloud) in
+        all.iter().flat_map(|of| [&cloud, &with_gap].map(|on| (of.clone(), on)))
+    {
         options.threads = 1;
-        let one = compute(&mut Estimator::new(options.clone()), &cloud);
+        let one = compute(&mut Estimator::new(options.clone()), cloud);
         for threads in [2, 3] {
             options.threads = threads;
-            let found = compute(&mut Estimator::new(options.clone()), &cloud);
+            let found = compute(&mut Estimator::new(options.clone()), cloud);
             assert_same_bits(&found, &one, width, &format!("{options:?}"));
         }
     }
@@ -255,8 +263,12 @@ fn only_the_first_frame_allocates() {
     for mut options in all {
         options.threads = 1;
         let what = format!("{options:?}");
+        let before = HELD.with(Cell::get);
         let mut estimator = Estimator::new(options);
         let (size, _) = memory_of_frame(&mut estimator, &frames[0], &mut found);
+        let held = HELD.with(Cell::get).wrapping_sub(before);
+        // The workers' own structs are not counted.
+        assert!((size..size + 4096).contains(&held), "{size} of {held}: {what}");
         for again in &frames {
             let memory = memory_of_frame(&mut estimator, again, &mut found);
             assert_eq!(memory, (size, 0), "{what}");
