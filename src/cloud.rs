@@ -29,7 +29,7 @@ impl Grid {
         point_stride: usize,
         row_stride: usize,
     ) -> Result<Self, Error> {
-        if width == 0 || height == 0 || width > i32::MAX as usize || height > i32::MAX as usize {
+        if width == 0 || height == 0 {
             return Err(Error::Size);
         }
         if !point_stride.is_multiple_of(FIELD) || !row_stride.is_multiple_of(FIELD) {

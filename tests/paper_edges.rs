@@ -166,21 +166,21 @@ fn exact_depths_have_exact_normals_up_to_the_edges() {
     }
 }
 
-/// Mean and largest angle to the truth over the points with a normal, of which there must be some, away from those that
-/// `is_spoilt` tells of.
-fn errors(frame: &Frame, normals: &[[f32; 3]], is_spoilt: impl Fn(usize) -> bool) -> [f64; 2] {
-    let (mut sum, mut largest, mut found) = (0.0, 0.0_f64, 0.0);
+/// The mean angle to the truth over the points with a normal, of which there must be some, but those that `is_spoilt`
+/// tells of.
+fn mean_error(frame: &Frame, normals: &[[f32; 3]], is_spoilt: impl Fn(usize) -> bool) -> f64 {
+    let (mut sum, mut found) = (0.0, 0.0);
     for (at, normal) in normals.iter().enumerate() {
         if frame.points[at][2].is_nan() || is_spoilt(at) || normal[0].is_nan() {
             continue;
         }
         let truth = frame.normals[at];
         let cosine: f64 = (0..3).map(|i| f64::from(normal[i]) * f64::from(truth[i])).sum();
-        let degrees = cosine.clamp(-1.0, 1.0).acos().to_degrees();
-        (sum, largest, found) = (sum + degrees, largest.max(degrees), found + 1.0);
+        sum += cosine.clamp(-1.0, 1.0).acos().to_degrees();
+        found += 1.0;
     }
     assert!(found > 1000.0, "{found} points");
-    [sum / found, largest]
+    sum / found
 }
 
 /// Zeros that count as points are a surface of their own: those around them get windows without them.
@@ -197,9 +197,10 @@ fn zeros_spoil_no_window_elsewhere() {
             let mut options = options(Method::CovarianceMatrix, true, creases);
             options.semantics = semantics;
             let normals = normals(&frame.points, width, options);
-            let [mean, _] = errors(&frame, &normals, is_zero);
+            let mean = mean_error(&frame, &normals, is_zero);
             println!("{semantics:?} {creases}: {mean:.2} deg");
-            assert!(mean < 1.0, "{semantics:?} {creases}: {mean}");
+            let bound = if creases { 0.1 } else { 0.4 };
+            assert!(mean < bound, "{semantics:?} {creases}: {mean}");
         }
     }
 }
@@ -220,33 +221,13 @@ fn missing_points_spoil_no_window_elsewhere() {
                     let mut options = options(method, one_sided, true);
                     options.semantics = semantics;
                     let normals = normals(&frame.points, width, options);
-                    let [mean, _] = errors(&frame, &normals, |_| false);
+                    let mean = mean_error(&frame, &normals, |_| false);
                     let what = format!("{name} {method:?} {semantics:?} {one_sided}");
                     println!("{what}: {mean:.2} deg");
                     assert!(mean < bound, "{what}: {mean}");
                 }
             }
         }
-    }
-}
-
-/// Gaps in a slanted plane are no depth changes.
-#[test]
-fn gaps_in_a_plane_are_no_edges() {
-    let (mut frame, _) = frame("plane", [320.0, 120.0], Noise::None);
-    let width = frame.width();
-    for at in 0..frame.points.len() {
-        if at % width % 16 < 4 {
-            frame.points[at] = [f32::NAN; 3];
-        }
-    }
-    for semantics in Semantics::ALL {
-        let mut options = options(Method::CovarianceMatrix, true, false);
-        options.semantics = semantics;
-        let normals = normals(&frame.points, width, options);
-        let [mean, largest] = errors(&frame, &normals, |_| false);
-        println!("{semantics:?}: {mean:.5} deg, {largest:.5}");
-        assert!(largest < 0.1, "{semantics:?}: {largest}");
     }
 }
 

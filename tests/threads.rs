@@ -81,6 +81,9 @@ fn where_depth_changes_are_far_away_the_number_of_threads_does_not_matter_either
     }
     let mut with_gap = cloud.clone();
     with_gap.fill(40..80, 150..450, [f32::NAN; 3]);
+    for (at, point) in with_gap.points.iter_mut().enumerate().skip(450 * width) {
+        point[2] += if (40..80).contains(&(at % width)) { 20.0 } else { 0.0 };
+    }
     let mut all = paper_options();
     all.extend(edge_options());
     for (mut options, cloud) in

@@ -210,6 +210,7 @@ impl Sweep {
         let squares = &mut squares[..length + 2 * margin];
         let least = &mut least[..length + 2 * margin];
         below.fill(FAR);
+        // Beside a row no depth changes lie, nor behind its end: there are no depths.
         squares.fill(FAR * FAR);
         least.fill(FAR * FAR);
         // SAFETY: as the caller's; the margins are as wide as the search is.
@@ -228,8 +229,6 @@ impl Sweep {
                 if !rows.own.contains(&y) {
                     continue;
                 }
-                // No depth change lies behind the row's end.
-                squares[margin + rows.width..].fill(FAR * FAR);
                 least_of_next::<S>(squares, least);
                 let depths = rows.depths(y).as_ptr();
                 for x in (0..inside).step_by(LANES) {
