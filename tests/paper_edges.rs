@@ -168,6 +168,18 @@ fn exact_depths_have_exact_normals_up_to_the_edges() {
     }
 }
 
+/// Where a round surface turns away, neighbours are as far apart as across an edge: their slope explains that.
+#[test]
+fn steep_surfaces_are_no_edges() {
+    let (frame, distances) = frame("sphere", [320.0, 120.0], Noise::None);
+    for method in [Method::CovarianceMatrix, Method::Average3DGradient] {
+        let normals = normals(&frame.points, frame.width(), options(method, true, false));
+        let edge = score(&frame, &normals, |at| distances.band(at) == Band::DepthEdge);
+        println!("{method:?}: {:.2} deg", edge.mean);
+        assert!(edge.mean < 2.0, "{method:?}: {}", edge.mean);
+    }
+}
+
 /// Zeros that count as points are a surface of their own: those around them get windows without them.
 #[test]
 fn zeros_spoil_no_window_elsewhere() {
