@@ -101,6 +101,24 @@ mod tests {
     }
 
     #[test]
+    fn other_windows_are_clipped() {
+        let fold = |start, size| super::fold(start, size, 10, BorderPolicy::Ignore);
+        assert_eq!(fold(2, 5), [2..7, 0..0]);
+        assert_eq!(fold(-2, 5), [0..3, 0..0]);
+        assert_eq!(fold(7, 5), [7..10, 0..0]);
+        assert_eq!(fold(12, 5), [10..10, 0..0]);
+    }
+
+    #[test]
+    fn single_pixels_are_folded_or_clamped() {
+        let fold = |at, policy| fold_pixel(at, 10, policy);
+        let mirrored = [-3, 0, 9, 10, 12, 50].map(|at| fold(at, BorderPolicy::Mirror));
+        assert_eq!(mirrored, [3, 0, 9, 9, 7, 0]);
+        let clamped = [-3, 0, 9, 10, 12, 50].map(|at| fold(at, BorderPolicy::Ignore));
+        assert_eq!(clamped, [0, 0, 9, 9, 9, 9]);
+    }
+
+    #[test]
     fn a_window_that_starts_behind_the_image_takes_its_last_column_away() {
         let image = Image { width: 10, height: 6, border_policy: BorderPolicy::Mirror };
         let rects: Vec<_> = image.rects((10, 1), (3, 2)).collect();

@@ -77,3 +77,25 @@ fn single_precision_normal(a: [f32; 3], b: [f32; 3]) -> Estimate {
     let scale = 1.0 / squared_length.sqrt();
     Estimate { normal: n.map(|c| c * scale), curvature: f32::NAN }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::options::BorderPolicy;
+
+    /// The right half window of a pixel of the last column takes away that column's depths, and of the others there is one:
+    /// to PCL their mean is next to 0.
+    #[test]
+    fn a_count_below_zero_is_a_very_large_one() {
+        let image = Image { width: 10, height: 6, border_policy: BorderPolicy::Mirror };
+        let mut points: Vec<_> = (0..60).map(|i| [(i % 10) as f32, (i / 10) as f32, 1.0]).collect();
+        for at in [26, 27, 28, 36, 37] {
+            points[at][2] = f32::NAN;
+        }
+        let view = Points::interleaved(points.as_flattened(), 10, 6, 3, 0).unwrap();
+        let [x, _, z] = estimate(&view, &image, (9, 3), (6, 4)).normal;
+        // Along the row depth falls from 1 to next to 0, over the way in x between the two single points.
+        let (left, right) = (points[37][0], points[38][0]);
+        assert!((x.abs() - z.abs() / (right - left)).abs() < 1e-6, "{x} {z}");
+    }
+}
