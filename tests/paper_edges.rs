@@ -168,15 +168,20 @@ fn exact_depths_have_exact_normals_up_to_the_edges() {
     }
 }
 
-/// Where a round surface turns away, neighbours are as far apart as across an edge: their slope explains that.
+/// Where a round surface turns away, neighbours are as far apart as across an edge: their slope explains that, which helps
+/// all methods but SDC.
 #[test]
 fn steep_surfaces_are_no_edges() {
     let (frame, distances) = frame("sphere", [320.0, 120.0], Noise::None);
-    for method in [Method::CovarianceMatrix, Method::Average3DGradient] {
+    for (method, bound) in [
+        (Method::CovarianceMatrix, 2.0),
+        (Method::Average3DGradient, 2.0),
+        (Method::AverageDepthChange, 4.6),
+    ] {
         let normals = normals(&frame.points, frame.width(), options(method, true, false));
         let edge = score(&frame, &normals, |at| distances.band(at) == Band::DepthEdge);
         println!("{method:?}: {:.2} deg", edge.mean);
-        assert!(edge.mean < 2.0, "{method:?}: {}", edge.mean);
+        assert!(edge.mean < bound, "{method:?}: {}", edge.mean);
     }
 }
 

@@ -122,7 +122,10 @@ impl SecondPass {
             return refill(&mut self.choices, repeat_n(NO_WINDOW, cloud.depths.len()));
         }
         engine.find_depth_changes(depth_changes, cloud)?;
-        depth_changes.drop_explained(cloud, engine.workers());
+        // Where surfaces are so steep, SDC's own small windows are nearer to the truth than larger ones.
+        if options.method != Method::AverageDepthChange {
+            depth_changes.drop_explained(cloud, engine.workers());
+        }
         let size = (cloud.width, cloud.height);
         let limit = options.paper.largest_radius;
         let clean = depth_changes.clean(size, limit, engine.workers())?;
