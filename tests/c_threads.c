@@ -1,5 +1,5 @@
-/* The library's threads: how many, where it is unloaded and where the process is forked; the argument is its path. Each is tried
- * often: what goes wrong may do so now and then. Prints what failed; exits with 1 if anything did. */
+/* The library's threads: how many, where it is unloaded and where the process is forked; the argument is its path. The
+ * latter two are tried often: what goes wrong may do so now and then. Prints what failed; exits with 1 if anything did. */
 
 #define _POSIX_C_SOURCE 200809L
 

@@ -23,16 +23,20 @@ fn is_inside(cloud: &Cloud, (x, y): (usize, usize), (width, height): (usize, usi
     x >= reach_x && y >= reach_y && x + reach_x < cloud.width && y + reach_y < cloud.height
 }
 
+/// Whether a method looks at parts of the window, each clipped by itself.
+fn is_of_parts(method: Method) -> bool {
+    matches!(method, Method::AverageDepthChange | Method::Simple3DGradient)
+}
+
 /// The reference for pixel (x, y) with a window of a size, clipped at the border of the image; none where it has nothing
-/// to say: the points define no plane, or the window crosses the border and is of several parts.
+/// to say: the points define no plane, or the window crosses the border and the method looks at parts of it.
 fn reference(
     cloud: &Cloud,
     method: Method,
     pixel: (usize, usize),
     (width, height): (usize, usize),
 ) -> Option<Expected> {
-    let in_parts = matches!(method, Method::AverageDepthChange | Method::Simple3DGradient);
-    if in_parts && !is_inside(cloud, pixel, (width, height)) {
+    if is_of_parts(method) && !is_inside(cloud, pixel, (width, height)) {
         return None;
     }
     let (x, y) = (pixel.0 as isize, pixel.1 as isize);
@@ -255,8 +259,7 @@ fn chosen_windows_match_the_reference() {
                 }
             }
         }
-        let in_parts = matches!(method.0, Method::AverageDepthChange | Method::Simple3DGradient);
-        let is_clipped = method.1 == BorderPolicy::Ignore && !in_parts;
+        let is_clipped = method.1 == BorderPolicy::Ignore && !is_of_parts(method.0);
         assert!(compared[1] > 500 && (compared[0] > 100) == is_clipped, "{method:?} {compared:?}");
     }
 }

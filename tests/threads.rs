@@ -86,15 +86,15 @@ fn where_depth_changes_are_far_away_the_number_of_threads_does_not_matter_either
     }
     let mut all = paper_options();
     all.extend(edge_options());
-    for (mut options, cloud) in
-        all.iter().flat_map(|of| [&cloud, &with_gap].map(|on| (of.clone(), on)))
-    {
-        options.threads = 1;
-        let one = compute(&mut Estimator::new(options.clone()), cloud);
-        for threads in [2, 3] {
-            options.threads = threads;
-            let found = compute(&mut Estimator::new(options.clone()), cloud);
-            assert_same_bits(&found, &one, width, &format!("{options:?}"));
+    for mut options in all {
+        for cloud in [&cloud, &with_gap] {
+            options.threads = 1;
+            let one = compute(&mut Estimator::new(options.clone()), cloud);
+            for threads in [2, 3] {
+                options.threads = threads;
+                let found = compute(&mut Estimator::new(options.clone()), cloud);
+                assert_same_bits(&found, &one, width, &format!("{options:?}"));
+            }
         }
     }
 }
