@@ -8,6 +8,7 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 use crate::Error;
+use crate::cache::Level;
 use crate::simd::{Along, GROUP, Simd};
 
 /// The geometry that all fields of a view share. Strides are in bytes.
@@ -128,6 +129,8 @@ pub struct Points<'a> {
     grid: Grid,
     /// As [`Points::beside`] says.
     are_whole: bool,
+    /// Where lines are asked for to.
+    level: Level,
     lifetime: PhantomData<&'a [f32]>,
 }
 
@@ -200,7 +203,8 @@ impl<'a> Points<'a> {
         for field in [x, y, z] {
             check_field(field, &grid)?;
         }
-        Ok(Points { x, y, z, grid, are_whole: false, lifetime: PhantomData })
+        let (are_whole, level) = (false, Level::best());
+        Ok(Points { x, y, z, grid, are_whole, level, lifetime: PhantomData })
     }
 
     /// Pixels in a row.
@@ -258,17 +262,26 @@ impl<'a> Points<'a> {
         (unsafe { self.z.byte_add(y * self.grid.row_stride) }, self.grid.point_stride)
     }
 
-    /// Asks for the cache lines of so many points of row `y`, from column `x` on, if there is such a row: the hardware
-    /// does not see it coming where rows are read in pieces.
+    /// Asks for the cache lines of so many points of row `y`, from column `x` on, if there is such a row.
     #[inline(always)]
     pub(crate) fn prefetch(&self, y: usize, x: usize, count: usize) {
         if y < self.grid.height {
             let first = self.z.wrapping_byte_add(self.grid.offset(x, y));
-            prefetch(first, count, self.grid.point_stride);
+            self.level.read(first, count, self.grid.point_stride);
         }
     }
 
-    /// The same, to be read while `normals` are written. Whole if the 16 bytes from a point's x are part of the same cloud,
+    /// The same for the points some rows below row `y`, as rows are read downwards.
+    #[inline(always)]
+    pub(crate) fn prefetch_below(&self, y: usize, x: usize, count: usize) {
+        let rows = match self.level {
+            Level::First => 2,
+            Level::Second => 3,
+        };
+        self.prefetch(y + rows, x, count);
+    }
+
+    /// These points, to be read while `normals` are written. Whole if the 16 bytes from a point's x are part of the same cloud,
     /// and of nothing that `normals` writes, for every point but a row's last, or where rows follow each other the cloud's.
     pub(crate) fn beside(&self, normals: &Normals) -> Self {
         let interleaved = self.y == self.x.wrapping_add(1) && self.z == self.x.wrapping_add(2);
@@ -328,7 +341,8 @@ impl PointRow<'_> {
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     pub unsafe fn lanes<S: Along>(&self, at: usize) -> [S::F; 3] {
-        prefetch(self.first.wrapping_byte_add(self.below + at * self.step), S::LANES, self.step);
+        let below = self.first.wrapping_byte_add(self.below + at * self.step);
+        self.points.level.read(below, S::LANES, self.step);
         // SAFETY: as the caller's; the points are inside the row, and of those that are read whole none is the last.
         unsafe {
             if at + S::LANES <= self.whole {
@@ -358,9 +372,6 @@ impl PointRow<'_> {
     }
 }
 
-/// Bytes of a cache line.
-pub(crate) const LINE: usize = 64;
-
 /// Where normals go: nx, ny, nz and, if wanted, the curvature of every pixel. Other bytes stay untouched.
 #[derive(Debug)]
 pub struct Normals<'a> {
@@ -370,6 +381,8 @@ pub struct Normals<'a> {
     /// If all fields lie within eight floats, nx, ny and nz side by side: how many floats after nx the curvature is, 3 to
     /// 7, or 0 if it is not wanted.
     side_by_side: Option<usize>,
+    /// Where lines are asked for to.
+    level: Level,
     lifetime: PhantomData<&'a mut [f32]>,
 }
 
@@ -443,7 +456,8 @@ impl<'a> Normals<'a> {
             None => Some(0),
         };
         let side_by_side = place.filter(|_| ny == nx.wrapping_add(1) && nz == nx.wrapping_add(2));
-        let normals = Normals { normal, grid, curvature, side_by_side, lifetime: PhantomData };
+        let (level, lifetime) = (Level::best(), PhantomData);
+        let normals = Normals { normal, grid, curvature, side_by_side, level, lifetime };
         let fields = normals.fields();
         for (field, grid) in fields.iter().flatten() {
             check_field(*field, grid)?;
@@ -523,32 +537,7 @@ impl<'a> Normals<'a> {
     }
 }
 
-/// Asks for the cache lines of so many points or normals, which are `step` bytes apart: of those larger than a line, for the
-/// lines that they start in. To the second-level cache, as more of them can be on their way there at a time.
-#[inline(always)]
-pub(crate) fn prefetch(first: *const f32, count: usize, step: usize) {
-    #[cfg(target_arch = "x86_64")]
-    {
-        use std::arch::x86_64::{_MM_HINT_T1, _mm_prefetch};
-        // SAFETY: a prefetch reads and writes nothing, whatever the address.
-        let ask = |at| unsafe { _mm_prefetch::<_MM_HINT_T1>(first.wrapping_byte_add(at).cast()) };
-        if step == LINE / 4 {
-            // As below, but without a loop where the count is known.
-            (0..count.div_ceil(4)).for_each(|line| ask(line * LINE));
-        } else {
-            let mut at = 0;
-            while at < count * step {
-                ask(at);
-                at += LINE.max(step);
-            }
-        }
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = (first, count, step);
-}
-
-/// How far ahead lines are asked for, as normals are so far apart that stores would wait for them one by one; found by
-/// trying 64 to 256.
+/// How far ahead lines are asked for; found by trying 64 to 256.
 const PIXELS_AHEAD: usize = 192;
 
 impl Normals<'_> {
@@ -563,7 +552,7 @@ impl Normals<'_> {
         let Grid { point_stride, row_stride, .. } = self.grid;
         // There may be no such row, nor an address for it.
         let offset = y.wrapping_mul(row_stride).wrapping_add(x * point_stride);
-        prefetch(self.normal[0].wrapping_byte_add(offset), count, point_stride);
+        self.level.write(self.normal[0].wrapping_byte_add(offset), count, point_stride);
     }
 
     /// Writes as many pixels of a row as there are lanes: nx, ny, nz and the curvature.

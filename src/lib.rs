@@ -26,6 +26,7 @@
 //! # Ok::<(), iine::Error>(())
 //! ```
 
+mod cache;
 mod capi;
 mod cloud;
 mod depth_change;

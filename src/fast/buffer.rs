@@ -5,7 +5,7 @@ use std::marker::PhantomData;
 use std::ops::{Deref, DerefMut};
 
 use crate::Error;
-use crate::cloud::LINE;
+use crate::cache::LINE;
 use crate::memory::{bytes, resize};
 
 #[derive(Clone, Copy, Debug)]

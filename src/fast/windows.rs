@@ -377,7 +377,7 @@ fn floats_mut(row: &mut [Lanes]) -> &mut [f32] {
 
 impl Sweep {
     /// Depth changes of row `y`, from its depths and those of the next row: distance 0 at depth changes, `far`
-    /// elsewhere. Keeps the changes to the row below for the next row. Asks for the points three rows below. Returns the
+    /// elsewhere. Keeps the changes to the row below for the next row. Asks for the points that come next. Returns the
     /// least and the largest finite depth.
     ///
     /// # Safety
@@ -410,7 +410,7 @@ impl Sweep {
             let mut left = ends.next_lane(0.0).load::<S>();
             let mut own = z[0].load::<S>();
             for k in 0..segment {
-                points.prefetch(y + 3, k * LANES, LANES);
+                points.prefetch_below(y, k * LANES, LANES);
                 let right = z[k + 1].load::<S>();
                 let (lower, upper) = (below[k].load::<S>(), above[k].load::<S>());
                 let tested = tested[k].load::<S>();

@@ -7,7 +7,7 @@ use std::mem::MaybeUninit;
 
 use super::windows::least_depth_change;
 use crate::Error;
-use crate::cloud::prefetch;
+use crate::cache::Level;
 use crate::fast::arithmetic::Floats;
 use crate::fast::lanes::{LANES, Lanes};
 use crate::fast::tile::all;
@@ -480,7 +480,7 @@ impl Group<'_> {
         for y in row * BLOCK..(row * BLOCK + BLOCK).min(height) {
             for block in blocks {
                 let first = even.cloud.points[y * width + block * BLOCK].as_ptr();
-                prefetch(first, BLOCK, size_of::<[f32; 3]>());
+                Level::Second.read(first, BLOCK, size_of::<[f32; 3]>());
             }
         }
     }
