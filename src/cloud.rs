@@ -271,7 +271,8 @@ impl<'a> Points<'a> {
         }
     }
 
-    /// The same for the points some rows below row `y`, as rows are read downwards.
+    /// The same for the points below row `y`, as rows are read downwards: two rows below, or three where more lines can be
+    /// on their way.
     #[inline(always)]
     pub(crate) fn prefetch_below(&self, y: usize, x: usize, count: usize) {
         let rows = match self.level {
