@@ -129,7 +129,7 @@ pub struct Points<'a> {
     grid: Grid,
     /// As [`Points::beside`] says.
     are_whole: bool,
-    /// Where lines are asked for to.
+    /// The level of the cache that lines are asked for to.
     level: Level,
     lifetime: PhantomData<&'a [f32]>,
 }
@@ -382,7 +382,7 @@ pub struct Normals<'a> {
     /// If all fields lie within eight floats, nx, ny and nz side by side: how many floats after nx the curvature is, 3 to
     /// 7, or 0 if it is not wanted.
     side_by_side: Option<usize>,
-    /// Where lines are asked for to.
+    /// The level of the cache that lines are asked for to.
     level: Level,
     lifetime: PhantomData<&'a mut [f32]>,
 }

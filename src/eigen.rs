@@ -1,5 +1,7 @@
 //! The eigenvector of the smallest eigenvalue of a symmetric 3x3 matrix.
 
+use crate::vector::difference;
+
 /// A symmetric 3x3 matrix: its upper triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Symmetric3 {
@@ -69,7 +71,7 @@ impl Scatter {
         mean = mean.map(|sum| sum / count);
         let mut matrix = Symmetric3::default();
         points().for_each(|point| {
-            matrix.add_outer([point[0] - mean[0], point[1] - mean[1], point[2] - mean[2]]);
+            matrix.add_outer(difference(point, mean));
         });
         Some(Scatter { matrix, mean, count })
     }

@@ -1,7 +1,7 @@
 //! Step 5: normals are turned towards the viewpoint.
 
 use crate::methods::Estimate;
-use crate::vector::dot;
+use crate::vector::{difference, dot};
 
 /// The estimate, its normal turned so that (viewpoint - point) . normal is not negative; in f32, as PCL's
 /// `flipNormalTowardsViewpoint`.
@@ -11,7 +11,6 @@ pub(crate) fn turn_to_viewpoint(
     point: [f32; 3],
     viewpoint: [f32; 3],
 ) -> Estimate {
-    let to_viewpoint = [viewpoint[0] - point[0], viewpoint[1] - point[1], viewpoint[2] - point[2]];
-    let sign = if dot(to_viewpoint, normal) < 0.0 { -1.0 } else { 1.0 };
+    let sign = if dot(difference(viewpoint, point), normal) < 0.0 { -1.0 } else { 1.0 };
     Estimate { normal: normal.map(|c| c * sign), curvature }
 }

@@ -1,6 +1,11 @@
-//! Products of vectors of numbers, or of lanes of them.
+//! Differences and products of vectors of numbers, or of lanes of them.
 
 use std::ops::{Add, Mul, Sub};
+
+#[inline(always)]
+pub(crate) fn difference<T: Copy + Sub<Output = T>>(a: [T; 3], b: [T; 3]) -> [T; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
 
 #[inline(always)]
 pub(crate) fn cross<T: Copy + Mul<Output = T> + Sub<Output = T>>(a: [T; 3], b: [T; 3]) -> [T; 3] {

@@ -9,7 +9,7 @@ use crate::depth_change::threshold;
 use crate::options::Options;
 use crate::paper::ROUNDING;
 use crate::simd::{Along, Groups, Simd};
-use crate::vector::{cross, dot};
+use crate::vector::{cross, difference, dot};
 
 /// What depths are summed up in.
 pub(crate) trait Depth: Lane + Number {
@@ -176,7 +176,7 @@ pub(crate) fn spacing(points: &Points) -> f32 {
     let apart = pixels.map(|(x, y)| {
         let x = x.max(1);
         let (a, b) = (points.at(x - 1, y), points.at(x, y));
-        let across = cross(a, [b[0] - a[0], b[1] - a[1], b[2] - a[2]]);
+        let across = cross(a, difference(b, a));
         (dot(across, across) / dot(a, a)).sqrt()
     });
     let (mut sorted, mut count) = ([0.0; (SAMPLES - 1) * (SAMPLES - 1)], 0);

@@ -13,7 +13,7 @@ use crate::memory::{bytes, make_room};
 use crate::methods::Estimate;
 use crate::paper::ROUNDING;
 use crate::simd::{GROUP, Groups, Simd};
-use crate::vector::dot;
+use crate::vector::{difference, dot};
 use crate::window::Image;
 
 /// x, y, z, xx, xy, xz, yy, yz, zz
@@ -67,7 +67,7 @@ fn sum_of_moments(points: impl Iterator<Item = [f64; 3]>) -> ([f64; CHANNELS], f
     let mut origin = None;
     points.for_each(|point| {
         let origin = origin.get_or_insert(point);
-        let [x, y, z] = [0, 1, 2].map(|c| point[c] - origin[c]);
+        let [x, y, z] = difference(point, *origin);
         let of_point = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
         for (sum, value) in sums.iter_mut().zip(of_point) {
             *sum += value;

@@ -2,6 +2,7 @@
 
 use super::{Estimate, is_finite, normal_of_tangents, start};
 use crate::cloud::Points;
+use crate::vector::difference;
 use crate::window::Image;
 
 /// The plain form: right strip minus left strip, lower strip minus upper strip.
@@ -30,7 +31,6 @@ pub(crate) fn estimate(
         }
         sum
     };
-    let difference = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     let horizontal = difference(strip((right, top), (1, height)), strip((left, top), (1, height)));
     let vertical = difference(strip((left, bottom), (width, 1)), strip((left, top), (width, 1)));
     normal_of_tangents(vertical, horizontal)
