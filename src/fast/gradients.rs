@@ -37,6 +37,16 @@ pub(crate) trait LeftCorners: Copy {
     /// # Safety
     /// As there.
     unsafe fn gradients<S: Simd>(self, pixel: *const Both<i32>, side: usize) -> S::I;
+
+    /// The same where the next window may have any other side: without a branch that nobody could predict.
+    ///
+    /// # Safety
+    /// As [`between`].
+    #[inline(always)]
+    unsafe fn gradients_of_one<S: Simd>(self, pixel: *const Both<i32>, side: usize) -> S::I {
+        // SAFETY: as the caller's.
+        unsafe { self.gradients::<S>(pixel, side) }
+    }
 }
 
 /// What lies between left corners above and below, in bytes, and so many columns to the right: of one window or, in more
@@ -103,7 +113,7 @@ impl Gradients {
                 for (lane, side) in (first..).zip(sides) {
                     let side = side as usize;
                     let left = *places.get_unchecked(side);
-                    let both = left.gradients::<S>(pixels.wrapping_add(lane), side);
+                    let both = left.gradients_of_one::<S>(pixels.wrapping_add(lane), side);
                     S::store(to.add(GROUP * lane), S::float_i(both));
                 }
             }

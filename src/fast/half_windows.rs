@@ -6,7 +6,7 @@ use super::arithmetic::Floats;
 use super::buffer::Buffer;
 use super::by_side;
 use super::depth::Depth;
-use super::planes::{Corners, Frame, MARGIN, Planes, sum_between};
+use super::planes::{Frame, MARGIN, Planes};
 use super::run::OfRun;
 use super::tile::{Found, Pair, Sums, Tile};
 use crate::Error;
@@ -28,8 +28,10 @@ pub(crate) struct HalfWindows<T> {
     doubt: f32,
     /// By half of the side of a window.
     places: Vec<Places>,
-    /// In the ring of points, the rows above and below the one aimed at.
-    rows: [usize; 2],
+    /// In the ring of points, the row aimed at, between the rows above and below.
+    rows: [usize; 3],
+    /// In the ring of integrals, the row above the one aimed at, and that one.
+    middle: [usize; 2],
 }
 
 /// Horizontal and vertical tangent.
@@ -40,39 +42,29 @@ const DOUBT_SINE: f32 = 1e-6;
 /// Or where the sums' rounding could.
 const DOUBT_ROUNDING: f64 = 1e8;
 
-/// What a window is made from, from the column of its pixel on.
+/// Where the rows that a window is made from begin, in the rings.
 #[derive(Debug)]
 struct Places {
-    /// In the ring of integrals: the half windows to the left and right, above and below.
-    halves: [Corners; 4],
+    /// Of integrals, above the half windows to the left and right, and their last.
+    beside: [usize; 2],
+    /// Of integrals, above the half window above, and the last of the one below.
+    outer: [usize; 2],
+    /// Of points, those of the vertical tangent's ends.
+    ends: [usize; 2],
     /// One over the points in a half window, and over the scale of sums.
     share: f32,
-    /// In the ring of points, the ends of both tangents: left and right, above and below.
-    ends: [[usize; 2]; 2],
 }
 
 impl Places {
     fn of(frame: &Frame, y: usize, half: usize, scale: f32) -> Self {
         let share = 1.0 / ((half * half) as f32 * scale);
         let (half, quarter) = (half as isize, (half / 2) as isize);
-        // Integrals end before a half window and with it.
-        let ends = |first: isize| [first - 1, first + half - 1];
-        let half_window = |x: isize, row: isize| frame.corners(y, ends(row), ends(x));
-        let point = |x: isize, row: isize| {
-            frame.start(3, y.wrapping_add_signed(row)).wrapping_add_signed(x)
-        };
+        let row = |planes: usize, row: isize| frame.start(planes, y.wrapping_add_signed(row));
         Places {
-            halves: [
-                half_window(-half, -quarter),
-                half_window(1, -quarter),
-                half_window(-quarter, -half),
-                half_window(-quarter, 1),
-            ],
+            beside: [row(1, -quarter - 1), row(1, half - quarter - 1)],
+            outer: [row(1, -half - 1), row(1, half)],
+            ends: [row(3, -quarter), row(3, quarter)],
             share,
-            ends: [
-                [point(-quarter - 1, 0), point(quarter + 1, 0)],
-                [point(-1, -quarter), point(1, quarter)],
-            ],
         }
     }
 }
@@ -111,30 +103,47 @@ impl<T: Depth> HalfWindows<T> {
         x: usize,
         side: usize,
     ) -> Tangents<Floats<S>> {
-        let half = side / 2;
-        let Places { halves, share, ends } = &self.places[half];
+        let (half, quarter) = (side / 2, side / 4);
+        let Places { beside, outer, ends, share } = &self.places[half];
         let x = frame.column(x);
         // SAFETY: as the caller's: rows and columns are held, and so are the lanes from these columns on.
         unsafe {
+            let points = planes.as_ptr().wrapping_add(x);
+            let plane = |c: usize, row: usize| points.wrapping_add(row + c * frame.stride);
+            let point = |at: *const f32| Floats::<S>::load(at);
+            let [above, own, below] = self.rows;
             let mut tangents = if half == 1 {
-                let plane = planes.as_ptr().add(x + 2 * frame.stride);
-                let z = |place: usize| Floats::<S>::load(plane.wrapping_add(place));
-                let ([left, right], [above, below]) = (ends[0], self.rows);
-                [[z(right) - z(left); 3], [z(below) - z(above); 3]]
+                let own = plane(2, own);
+                let across = point(own.wrapping_add(1)) - point(own.wrapping_sub(1));
+                let along = point(plane(2, below)) - point(plane(2, above));
+                [[across; 3], [along; 3]]
             } else {
-                let ring = self.integrals.as_ptr().add(x);
-                let [left, right, up, down] = halves;
-                let sum = |half: &Corners| sum_between::<S, T>(ring, half);
-                let (across, along) = (sum(right) - sum(left), sum(down) - sum(up));
+                let ring = self.integrals.as_ptr().wrapping_add(x);
+                let row = |place: usize| ring.wrapping_add(place);
+                let between = |row: *const T, left: usize, right: usize| {
+                    T::load::<S>(row.wrapping_add(right)) - T::load::<S>(row.wrapping_sub(left))
+                };
+                let across = {
+                    let [above, below] = beside.map(row);
+                    let left = |row: *const T| between(row.wrapping_sub(1), half, 0);
+                    let right = |row: *const T| between(row, 0, half);
+                    (right(below) - right(above)) - (left(below) - left(above))
+                };
+                let along = {
+                    let [first, last] = outer.map(row);
+                    let [above, own] = self.middle.map(row);
+                    let across = |row: *const T| between(row, quarter + 1, half - quarter - 1);
+                    (across(last) - across(own)) - (across(above) - across(first))
+                };
                 let share = Floats::<S>::splat(*share);
                 [[T::floats::<S>(across) * share; 3], [T::floats::<S>(along) * share; 3]]
             };
             for c in 0..2 {
-                let plane = planes.as_ptr().add(x + c * frame.stride);
-                let point = |end: usize| Floats::load(plane.wrapping_add(end));
-                for g in 0..2 {
-                    tangents[g][c] = point(ends[g][1]) - point(ends[g][0]);
-                }
+                let own = plane(c, own);
+                let (left, right) = (own.wrapping_sub(quarter + 1), own.wrapping_add(quarter + 1));
+                let [up, down] = ends.map(|row| plane(c, row));
+                tangents[0][c] = point(right) - point(left);
+                tangents[1][c] = point(down.wrapping_add(1)) - point(up.wrapping_sub(1));
             }
             tangents
         }
@@ -235,7 +244,8 @@ impl<T: Depth> Sums for HalfWindows<T> {
         let scale = self.scale;
         self.places.clear();
         self.places.extend((0..=side / 2).map(|half| Places::of(frame, y, half, scale)));
-        self.rows = [y.wrapping_sub(1), y + 1].map(|row| frame.start(3, row));
+        self.rows = [y.wrapping_sub(1), y, y + 1].map(|row| frame.start(3, row));
+        self.middle = [y.wrapping_sub(1), y].map(|row| frame.start(1, row));
     }
 
     #[inline(always)]

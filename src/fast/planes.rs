@@ -100,20 +100,6 @@ impl Frame {
         self.ring
     }
 
-    /// The corners of what lies between two rows, counted from row `y`, and two columns, counted from a pixel's, in a
-    /// ring of one plane.
-    pub fn corners(
-        &self,
-        y: usize,
-        [above, below]: [isize; 2],
-        [left, right]: [isize; 2],
-    ) -> Corners {
-        let at = |row: isize, column: isize| {
-            self.start(1, y.wrapping_add_signed(row)).wrapping_add_signed(column)
-        };
-        [at(above, left), at(above, right), at(below, left), at(below, right)]
-    }
-
     /// Index of column `x` in a row; `x` may be up to the margin before the columns.
     #[inline(always)]
     pub fn column(&self, x: usize) -> usize {

@@ -64,13 +64,22 @@ impl Strips {
 impl LeftCorners for [usize; 3] {
     #[inline(always)]
     unsafe fn gradients<S: Simd>(self, pixel: *const Both<i32>, side: usize) -> S::I {
+        // SAFETY: as the caller's.
+        unsafe {
+            if side.is_multiple_of(2) {
+                let [above, below, _] = self;
+                return between::<S>(pixel, [above, below], side);
+            }
+            self.gradients_of_one::<S>(pixel, side)
+        }
+    }
+
+    #[inline(always)]
+    unsafe fn gradients_of_one<S: Simd>(self, pixel: *const Both<i32>, side: usize) -> S::I {
         let [above, horizontal, vertical] = self;
         // SAFETY: as the caller's.
         unsafe {
             let both = between::<S>(pixel, [above, horizontal], side & !1);
-            if side.is_multiple_of(2) {
-                return both;
-            }
             S::select_i(HORIZONTAL, both, between::<S>(pixel, [above, vertical], side))
         }
     }
