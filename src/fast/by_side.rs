@@ -24,14 +24,12 @@ pub(crate) unsafe fn note<S: Groups, T: Depth>(
 ) -> u32 {
     // SAFETY: as the caller's; the frame holds the largest side around every pixel of the tile.
     unsafe {
-        let [first, second] = [Group::<S>::new(pair, 0), Group::new(pair, GROUP)];
-        if let (Some(side), Some(other)) = (first.one_side(), second.one_side())
-            && side == other
-        {
-            let both = sums.of_pixels::<S::Pair>(frame, planes, first.x, side);
+        if let Some(side) = pair.one_side::<S::Pair>(0, pair.windows) {
+            let both = sums.of_pixels::<S::Pair>(frame, planes, pair.x, side);
             note_lanes::<S::Pair>(both, run, at);
             return 0;
         }
+        let [first, second] = [Group::<S>::new(pair, 0), Group::new(pair, GROUP)];
         let (of8, plain) = first.sum_up(sums, tile, frame, planes);
         note_lanes::<S>(of8, run, at);
         let (of8, more_plain) = second.sum_up(sums, tile, frame, planes);
@@ -72,20 +70,6 @@ impl<'a, S: Groups> Group<'a, S> {
             let inner = pair.is_inner(lane, GROUP);
             Group { x, y, row, sides, windows, inner }
         }
-    }
-
-    /// The side of all its windows, if they have the same and are inside the image.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    unsafe fn one_side(&self) -> Option<usize> {
-        if self.windows == 0 || !self.inner {
-            return None;
-        }
-        // SAFETY: as the caller's.
-        let (same, side) = unsafe { self.next_windows(self.windows) };
-        (same == self.windows).then_some(side)
     }
 
     /// The first of the lanes `todo` and those with sums over windows of the same side; and that side.
