@@ -1,10 +1,12 @@
 //! Sums of first and second moments, for COVARIANCE_MATRIX: the paper's nine integral images (Eq. 16-25), in f64 and
 //! about a point of the tile.
 
+use std::ops::Sub;
+
 use super::arithmetic::{Doubles, Floats};
 use super::buffer::Buffer;
 use super::lanes::LANES;
-use super::planes::{Frame, MARGIN, Planes, sum_between};
+use super::planes::{Frame, MARGIN, Planes};
 use super::run::{Noted, OfRun, RUN};
 use super::tile::{Bits, Found, Pair, Sums, Tile, all};
 use crate::Error;
@@ -37,12 +39,33 @@ pub(crate) struct Moments {
     places: Vec<Place>,
 }
 
-/// In the rings, the left corners of a window above and below; and one over its points. A window of no side has no sum.
+/// What a window of a side is the sum of. A window of no side has no sum.
 #[derive(Clone, Copy, Debug)]
 struct Place {
-    above: usize,
-    below: usize,
+    /// In numbers of the ring of most moments, which are as many bytes of the other one: both are addresses at once.
+    corners: Corners,
+    /// One over its points.
     share: f64,
+}
+
+/// Of what is above and below, left and right. Before a pixel's column is added, places may be wrapped around zero.
+type Corners = [[usize; 2]; 2];
+
+/// What lies between corners, where integral rows hold what `at` says.
+#[inline(always)]
+fn between<T: Sub<Output = T>>(corners: Corners, at: impl Fn(usize) -> T) -> T {
+    let [above, below] = corners.map(|[left, right]| at(right) - at(left));
+    below - above
+}
+
+/// The sums of most moments of the window of a pixel.
+///
+/// # Safety
+/// As [`Sums::note`].
+#[inline(always)]
+unsafe fn most_between<S: Groups>(pixel: *const f64, corners: Corners) -> S::D {
+    // SAFETY: as the caller's.
+    between(corners, |corner| Doubles::<S>(unsafe { S::load_d(pixel.wrapping_add(corner)) })).0
 }
 
 /// Moments of a group's windows, lane by lane.
@@ -105,17 +128,16 @@ impl Moments {
     /// As [`Sums::note`].
     #[inline(always)]
     unsafe fn of_side<S: Groups>(&self, frame: &Frame, x: usize, side: usize, to: &mut Lanewise) {
-        let column = frame.column(x);
-        let place @ Place { above, below, share } = self.places[side];
+        let [most, z] = self.at(frame.column(x));
+        let Place { corners, share } = self.places[side];
         // SAFETY: as the caller's: rows and columns are held, and so is the group from this column on.
         unsafe {
             for lane in 0..GROUP {
-                let most = self.most_between::<S>(column + lane, &place, side);
+                let most = most_between::<S>(most.wrapping_add(GROUP * lane), corners);
                 S::store_d(to.most[lane].as_mut_ptr(), most);
             }
-            let corners = [above, above.wrapping_add(side), below, below.wrapping_add(side)];
-            let z: Doubles<S> = sum_between(self.z.as_ptr().wrapping_add(column), &corners);
-            S::store_d(to.z.as_mut_ptr(), z.0);
+            let z = |corner| Doubles::<S>(S::load_d(z.wrapping_byte_add(corner)));
+            S::store_d(to.z.as_mut_ptr(), between(corners, z).0);
             S::store_d(to.share.as_mut_ptr(), S::splat_d(share));
         }
     }
@@ -133,37 +155,26 @@ impl Moments {
         lanes: u32,
         to: &mut Lanewise,
     ) {
-        let column = frame.column(pair.x + first);
+        let [most, z] = self.at(frame.column(pair.x + first));
+        let places = self.places.as_ptr();
         // SAFETY: as the caller's: no window of the row aimed at is larger, and rows and columns are held.
         unsafe {
             let sides = pair.sides::<S>(first, lanes);
             for lane in 0..GROUP {
-                let (column, side) = (column + lane, sides[lane] as usize);
-                let place = self.places.get_unchecked(side);
-                let most = self.most_between::<S>(column, place, side);
+                let Place { corners, share } = *places.add(sides[lane] as usize);
+                let most = most_between::<S>(most.wrapping_add(GROUP * lane), corners);
                 S::store_d(to.most[lane].as_mut_ptr(), most);
-                let z = self.z.as_ptr().wrapping_add(column);
-                let difference =
-                    |left: usize| *z.wrapping_add(left.wrapping_add(side)) - *z.wrapping_add(left);
-                to.z[lane] = difference(place.below) - difference(place.above);
-                to.share[lane] = place.share;
+                let z = z.wrapping_add(lane);
+                to.z[lane] = between(corners, |corner| *z.wrapping_byte_add(corner));
+                to.share[lane] = share;
             }
         }
     }
 
-    /// The sums of most moments of the window of the pixel in this column.
-    ///
-    /// # Safety
-    /// As [`Sums::note`].
+    /// Where both rings have a column, in the row that corners are counted from.
     #[inline(always)]
-    unsafe fn most_between<S: Groups>(&self, column: usize, place: &Place, side: usize) -> S::D {
-        let pixel = self.most.as_ptr().wrapping_add(column);
-        // SAFETY: as the caller's.
-        unsafe {
-            let at = |corner: usize| S::load_d(pixel.wrapping_add(corner).cast());
-            let difference = |left: usize| S::sub_d(at(left.wrapping_add(side)), at(left));
-            S::sub_d(difference(place.below), difference(place.above))
-        }
+    fn at(&self, column: usize) -> [*const f64; 2] {
+        [self.most.as_ptr().wrapping_add(column).cast(), self.z.as_ptr().wrapping_add(column)]
     }
 
     /// Puts the moments of windows that cross the border of the image, of some lanes of a pair's group that begins with
@@ -336,14 +347,15 @@ impl Sums for Moments {
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
         let place = |side: usize| {
             let before = -((side / 2) as isize) - 1;
-            let row = |row: isize| frame.start(1, y.wrapping_add_signed(row));
-            let [above, below] =
-                [before, before + side as isize].map(|at| row(at).wrapping_add_signed(before));
-            Place { above, below, share: 1.0 / (side * side) as f64 }
+            let ends = [before, before + side as isize];
+            let corners = ends.map(|row| {
+                let row = frame.start(1, y.wrapping_add_signed(row));
+                ends.map(|column| row.wrapping_add_signed(column).wrapping_mul(GROUP))
+            });
+            Place { corners, share: 1.0 / (side * side) as f64 }
         };
-        let own = frame.start(1, y);
         self.places.clear();
-        self.places.push(Place { above: own, below: own, share: 0.0 });
+        self.places.push(Place { share: 0.0, ..place(0) });
         self.places.extend((1..=side).map(place));
     }
 
@@ -358,6 +370,8 @@ impl Sums for Moments {
         at: usize,
     ) -> u32 {
         let all_inside = tile.inside(pair);
+        // SAFETY: as the caller's.
+        let one = unsafe { pair.one_side::<S::Pair>(0, pair.windows) };
         let mut plain = 0;
         for group in 0..LANES / GROUP {
             let (first, to) = (group * GROUP, &mut run.windows[group]);
@@ -368,7 +382,7 @@ impl Sums for Moments {
             }
             // SAFETY: as the caller's.
             unsafe {
-                if let Some(side) = pair.one_side::<S>(first, lanes) {
+                if let Some(side) = one {
                     self.of_side::<S>(frame, pair.x + first, side, to);
                     continue;
                 }

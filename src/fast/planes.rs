@@ -6,7 +6,6 @@ use super::arithmetic::Floats;
 use super::buffer::{Buffer, Number};
 use super::incomplete::Incomplete;
 use super::lanes::LANES;
-use super::run::Lane;
 use crate::Error;
 use crate::cloud::Points;
 use crate::simd::{Along, GROUP, Simd};
@@ -112,23 +111,6 @@ impl Frame {
 #[inline(always)]
 pub(crate) fn window_reach(side: usize) -> (usize, usize) {
     (side / 2 + 1, side.div_ceil(2))
-}
-
-/// Left and right above, left and right below. Before a pixel's column is added, they may be wrapped around zero.
-pub(crate) type Corners = [usize; 4];
-
-/// The sum between the corners, of integral rows.
-///
-/// # Safety
-/// The processor has the instruction set of `S`, and the lanes at these corners are inside the ring.
-#[inline(always)]
-pub(crate) unsafe fn sum_between<S: Simd, T: Lane>(ring: *const T, corners: &Corners) -> T::Of<S> {
-    let [left_above, right_above, left_below, right_below] = *corners;
-    // SAFETY: as the caller's.
-    unsafe {
-        let at = |corner: usize| T::load::<S>(ring.wrapping_add(corner));
-        (at(right_below) - at(left_below)) - (at(right_above) - at(left_above))
-    }
 }
 
 /// The ring of x, y and z rows. In place of points that miss a coordinate, and of those behind a row's last, stands the
