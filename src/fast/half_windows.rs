@@ -7,7 +7,7 @@ use super::buffer::Buffer;
 use super::by_side;
 use super::depth::Depth;
 use super::planes::{Frame, MARGIN, Planes};
-use super::run::OfRun;
+use super::run::{Lane, OfRun};
 use super::tile::{Found, Pair, Sums, Tile};
 use crate::Error;
 use crate::memory::{bytes, make_room};
@@ -69,6 +69,22 @@ impl Places {
     }
 }
 
+/// The sum between two columns, counted from the pixel that the integral rows above and below are given from.
+///
+/// # Safety
+/// The processor has the instruction set of `S`, and the lanes at the corners are inside the ring.
+#[inline(always)]
+unsafe fn sum_between<S: Simd, T: Lane>(
+    [above, below]: [*const T; 2],
+    [left, right]: [isize; 2],
+) -> T::Of<S> {
+    // SAFETY: as the caller's.
+    unsafe {
+        let at = |row: *const T, column: isize| T::load::<S>(row.wrapping_offset(column));
+        (at(below, right) - at(below, left)) - (at(above, right) - at(above, left))
+    }
+}
+
 impl<T: Depth> HalfWindows<T> {
     /// With depths multiplied so.
     pub fn scaled(&mut self, scale: f32) -> &mut Self {
@@ -119,22 +135,17 @@ impl<T: Depth> HalfWindows<T> {
                 [[across; 3], [along; 3]]
             } else {
                 let ring = self.integrals.as_ptr().wrapping_add(x);
-                let row = |place: usize| ring.wrapping_add(place);
-                let between = |row: *const T, left: usize, right: usize| {
-                    T::load::<S>(row.wrapping_add(right)) - T::load::<S>(row.wrapping_sub(left))
-                };
-                let across = {
-                    let [above, below] = beside.map(row);
-                    let left = |row: *const T| between(row.wrapping_sub(1), half, 0);
-                    let right = |row: *const T| between(row, 0, half);
-                    (right(below) - right(above)) - (left(below) - left(above))
-                };
-                let along = {
-                    let [first, last] = outer.map(row);
-                    let [above, own] = self.middle.map(row);
-                    let across = |row: *const T| between(row, quarter + 1, half - quarter - 1);
-                    (across(last) - across(own)) - (across(above) - across(first))
-                };
+                let rows = |rows: [usize; 2]| rows.map(|row| ring.wrapping_add(row));
+                // Integrals end before a half window and with it.
+                let (beside, [above, own], [first, last]) =
+                    (rows(*beside), rows(self.middle), rows(*outer));
+                let (half, quarter) = (half as isize, quarter as isize);
+                let (before, with) = (-quarter - 1, half - quarter - 1);
+                let left = sum_between::<S, T>(beside, [-half - 1, -1]);
+                let right = sum_between::<S, T>(beside, [0, half]);
+                let up = sum_between::<S, T>([first, above], [before, with]);
+                let down = sum_between::<S, T>([own, last], [before, with]);
+                let (across, along) = (right - left, down - up);
                 let share = Floats::<S>::splat(*share);
                 [[T::floats::<S>(across) * share; 3], [T::floats::<S>(along) * share; 3]]
             };
