@@ -64,9 +64,14 @@ const STRIP_PIXELS: usize = 1 << 18;
 /// A slice has so many times as many rows as its windows reach, at least: the sweep up starts that far below it.
 const SLICE_REACHES: usize = 4;
 
-/// Bytes of a tile's rings, to stay near the second-level cache without narrow tiles, the columns around which are
-/// summed again. Found, as the rows, by trying less and more with windows of 5 to 50 pixels.
+/// Bytes of a tile's rings, to stay near the second-level cache. Found, as the rows, by trying less and more with windows
+/// of 5 to 80 pixels.
 const TILE_BYTES: usize = 3 << 19;
+
+/// A tile is so many times as wide as its windows reach, at least, as the columns around it are summed again; but a row of
+/// its rings has no more bytes than these. Such rings come from the third level, row by row, as the hardware sees.
+const TILE_REACHES: usize = 20;
+const ROW_BYTES: usize = 56 << 10;
 
 /// Scratch memory and threads, reused from frame to frame.
 #[derive(Debug, Default)]
@@ -420,8 +425,9 @@ impl Job<'_> {
                 Method::AverageDepthChange => HalfWindows::<f64>::COLUMN,
                 Method::Simple3DGradient => Strips::COLUMN,
             };
-        let bytes = column * Frame::ring(reach);
-        let columns = (TILE_BYTES / bytes).max(2 * reach).next_multiple_of(LANES);
+        let least = (TILE_REACHES * reach).min(ROW_BYTES / column).max(2 * reach);
+        let columns = TILE_BYTES / (column * Frame::ring(reach));
+        let columns = columns.max(least).next_multiple_of(LANES);
         // Tiles of like widths.
         let across = self.image.width.div_ceil(columns);
         self.image.width.div_ceil(across).next_multiple_of(GROUP)
