@@ -34,8 +34,8 @@ use Semantics::{Paper, Pcl};
 
 /// Instructions a pixel at most: with AVX2, with SSE2. The paper has no border policies.
 const BOUNDS: [(Semantics, Method, BorderPolicy, u64, u64); 10] = [
-    (Pcl, CovarianceMatrix, Ignore, 191, 391),
-    (Pcl, CovarianceMatrix, Mirror, 229, 439),
+    (Pcl, CovarianceMatrix, Ignore, 183, 390),
+    (Pcl, CovarianceMatrix, Mirror, 219, 434),
     (Pcl, Average3DGradient, Ignore, 105, 189),
     (Pcl, Average3DGradient, Mirror, 133, 227),
     (Pcl, AverageDepthChange, Ignore, 94, 172),
