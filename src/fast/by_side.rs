@@ -24,7 +24,7 @@ pub(crate) unsafe fn note<S: Groups, T: Depth>(
 ) -> u32 {
     // SAFETY: as the caller's; the frame holds the largest side around every pixel of the tile.
     unsafe {
-        if let Some(side) = pair.one_side::<S::Pair>(0, pair.windows) {
+        if let Some(side) = pair.one_side::<S>(pair.windows) {
             let both = sums.of_pixels::<S::Pair>(frame, planes, pair.x, side);
             note_lanes::<S::Pair>(both, run, at);
             return 0;

@@ -100,7 +100,7 @@ impl Gradients {
         let pixels = ring.as_ptr().wrapping_add(frame.column(pair.x));
         // SAFETY: as the caller's: rows and columns are held.
         unsafe {
-            if let Some(side) = pair.one_side::<S::Pair>(0, lanes) {
+            if let Some(side) = pair.one_side::<S>(lanes) {
                 let left = *places.get_unchecked(side);
                 for lane in (0..LANES).step_by(S::Widest::LANES / GROUP) {
                     let both = left.gradients::<S::Widest>(pixels.wrapping_add(lane), side);

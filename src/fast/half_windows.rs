@@ -45,9 +45,9 @@ const DOUBT_ROUNDING: f64 = 1e8;
 /// Where the rows that a window is made from begin, in the rings.
 #[derive(Debug)]
 struct Places {
-    /// Of integrals, above the half windows to the left and right, and their last.
+    /// Of integrals, which end before a half window and with it: for those to the left and right.
     beside: [usize; 2],
-    /// Of integrals, above the half window above, and the last of the one below.
+    /// Of integrals, before the half window above, and with the one below.
     outer: [usize; 2],
     /// Of points, those of the vertical tangent's ends.
     ends: [usize; 2],
@@ -136,7 +136,6 @@ impl<T: Depth> HalfWindows<T> {
             } else {
                 let ring = self.integrals.as_ptr().wrapping_add(x);
                 let rows = |rows: [usize; 2]| rows.map(|row| ring.wrapping_add(row));
-                // Integrals end before a half window and with it.
                 let (beside, [above, own], [first, last]) =
                     (rows(*beside), rows(self.middle), rows(*outer));
                 let (half, quarter) = (half as isize, quarter as isize);

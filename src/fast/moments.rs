@@ -371,7 +371,7 @@ impl Sums for Moments {
     ) -> u32 {
         let all_inside = tile.inside(pair);
         // SAFETY: as the caller's.
-        let one = unsafe { pair.one_side::<S::Pair>(0, pair.windows) };
+        let one_side = unsafe { pair.one_side::<S>(pair.windows) };
         let mut plain = 0;
         for group in 0..LANES / GROUP {
             let (first, to) = (group * GROUP, &mut run.windows[group]);
@@ -382,7 +382,7 @@ impl Sums for Moments {
             }
             // SAFETY: as the caller's.
             unsafe {
-                if let Some(side) = one {
+                if let Some(side) = one_side {
                     self.of_side::<S>(frame, pair.x + first, side, to);
                     continue;
                 }

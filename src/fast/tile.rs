@@ -644,19 +644,19 @@ impl<'a> Pair<'a> {
         ((x, self.y), self.row[x] as usize)
     }
 
-    /// The side of the windows of `lanes`, of those of `S` that begin with lane `first`, if they have the same and
-    /// windows of any of the tile's sides are inside the image there.
+    /// The side of the windows of `lanes`, if they have the same and windows of any of the tile's sides are inside the image
+    /// here.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub unsafe fn one_side<S: Simd>(&self, first: usize, lanes: u32) -> Option<usize> {
-        let x = self.x + first;
-        let side = self.row[x + lanes.trailing_zeros() as usize];
+    pub unsafe fn one_side<S: Groups>(&self, lanes: u32) -> Option<usize> {
+        let side = self.row[self.x + lanes.trailing_zeros() as usize];
         // SAFETY: as the caller's; sides are whole numbers that fit i32.
         unsafe {
-            let same = S::bits(S::eq(S::load(self.row.as_ptr().add(x)), S::splat(side)));
-            let have_one = lanes & !same == 0 && self.is_inner(first, S::LANES);
+            let sides = S::Pair::load(self.row.as_ptr().add(self.x));
+            let same = S::Pair::bits(S::Pair::eq(sides, S::Pair::splat(side)));
+            let have_one = lanes & !same == 0 && self.is_inner(0, LANES);
             have_one.then(|| side.to_int_unchecked::<i32>() as usize)
         }
     }
