@@ -327,6 +327,12 @@ pub(crate) struct PointRow<'a> {
 }
 
 impl PointRow<'_> {
+    /// How many of the first points can be read whole: 16 bytes from x on.
+    #[inline(always)]
+    pub fn whole(&self) -> usize {
+        self.whole
+    }
+
     /// Where lanes start that together are all points: the last ones start before the end of those before them where fewer
     /// are left, so that none lies behind the row's last point.
     #[inline(always)]

@@ -5,7 +5,7 @@
 //! and the pixel's neighbours in the rows above and below lie at elements k - 1, k, k + 1.
 
 use super::buffer::Number;
-use crate::simd::{GROUP, Simd};
+use crate::simd::{Along, GROUP, Simd};
 
 pub(crate) const LANES: usize = 2 * GROUP;
 
@@ -19,22 +19,6 @@ unsafe impl Number for Lanes {}
 
 impl Lanes {
     pub const ZERO: Lanes = Lanes([0.0; LANES]);
-
-    /// Every lane takes the value of the one before, the first takes `first`.
-    #[inline(always)]
-    pub fn next_lane(&self, first: f32) -> Lanes {
-        let mut lanes = Lanes([first; LANES]);
-        lanes.0[1..].copy_from_slice(&self.0[..LANES - 1]);
-        lanes
-    }
-
-    /// Every lane takes the value of the one after, the last takes `last`.
-    #[inline(always)]
-    pub fn previous_lane(&self, last: f32) -> Lanes {
-        let mut lanes = Lanes([last; LANES]);
-        lanes.0[..LANES - 1].copy_from_slice(&self.0[1..]);
-        lanes
-    }
 
     /// The least lane; none is NaN.
     #[inline(always)]
@@ -50,14 +34,10 @@ impl Lanes {
 
     #[inline(always)]
     fn best(self, better: impl Fn(f32, f32) -> f32) -> f32 {
-        let mut lanes = self.0;
         // By halves, which are vectors.
-        for half in [8, 4, 2, 1] {
-            for lane in 0..half {
-                lanes[lane] = better(lanes[lane], lanes[lane + half]);
-            }
-        }
-        lanes[0]
+        let of_8: [f32; 8] = std::array::from_fn(|l| better(self.0[l], self.0[l + 8]));
+        let of_4: [f32; 4] = std::array::from_fn(|l| better(of_8[l], of_8[l + 4]));
+        better(better(of_4[0], of_4[2]), better(of_4[1], of_4[3]))
     }
 
     /// As many of the first as `S` has lanes.
@@ -100,28 +80,48 @@ impl LaneOrder {
         (x % self.segment, x / self.segment)
     }
 
-    /// Reads a row of floats, `stride` bytes apart, into lane order, and zeros past the row's end.
+    /// Reads a row of points' depths, `stride` bytes apart, into lane order, and zeros past the row's end. The first `whole`
+    /// points, side by side, have x and y before z and four bytes behind it, which can be read.
     ///
     /// # Safety
-    /// `row` is valid for `width` reads.
+    /// The processor has the instruction set of `S`; `row` is valid for `width` reads, and for those of whole points.
     #[inline(always)]
-    pub unsafe fn read(&self, row: *const f32, stride: usize, to: &mut [Lanes]) {
+    pub unsafe fn read<S: Along>(
+        &self,
+        row: *const f32,
+        stride: usize,
+        whole: usize,
+        to: &mut [Lanes],
+    ) {
+        const POINT: usize = 4;
+        let whole = if stride == POINT * size_of::<f32>() { whole } else { 0 };
+        let points = S::LANES / POINT;
         let to = to[..self.segment].as_mut_ptr().cast::<f32>();
         let lane_stride = self.segment * stride;
         for lane in (0..LANES).step_by(4) {
             // Elements that all four lanes have.
-            let together = self.width.saturating_sub((lane + 3) * self.segment).min(self.segment);
+            let all_have =
+                |count: usize| count.saturating_sub((lane + 3) * self.segment).min(self.segment);
+            let (whole, together) = (all_have(whole) / points * points, all_have(self.width));
             let mut from = row.wrapping_byte_add(lane * lane_stride);
-            for element in 0..together {
+            for element in (0..whole).step_by(points) {
+                // SAFETY: as the caller's; the points are whole.
+                unsafe {
+                    let first = from.sub(2);
+                    let four = [0, 1, 2, 3].map(|l| S::load(first.byte_add(l * lane_stride)));
+                    let [_, _, z, _] = S::transpose_fours(four);
+                    S::store_fours(S::add(z, S::sub(z, z)), |point| {
+                        to.add((element + point) * LANES + lane)
+                    });
+                }
+                from = from.wrapping_byte_add(points * stride);
+            }
+            for element in whole..together {
                 // SAFETY: the pixels' columns are below the width; element < segment = length of `to`.
                 unsafe {
                     let to = to.add(element * LANES + lane).cast::<[f32; 4]>();
-                    to.write([
-                        from.read(),
-                        from.byte_add(lane_stride).read(),
-                        from.byte_add(2 * lane_stride).read(),
-                        from.byte_add(3 * lane_stride).read(),
-                    ]);
+                    let of_lane = |l: usize| finite_or_nan(from.byte_add(l * lane_stride).read());
+                    to.write([0, 1, 2, 3].map(of_lane));
                 }
                 from = from.wrapping_byte_add(stride);
             }
@@ -132,7 +132,7 @@ impl LaneOrder {
                     // SAFETY: start + element < width where it is read, and element < segment = length of `to`.
                     unsafe {
                         let value = if element < inside {
-                            row.byte_add((start + element) * stride).read()
+                            finite_or_nan(row.byte_add((start + element) * stride).read())
                         } else {
                             0.0
                         };
@@ -164,6 +164,12 @@ impl LaneOrder {
             }
         }
     }
+}
+
+/// A number, or NaN if it is not finite.
+#[inline(always)]
+fn finite_or_nan(z: f32) -> f32 {
+    if z.is_finite() { z } else { f32::NAN }
 }
 
 /// Transposes 4 x 4 floats; the strides of the rows count floats.

@@ -448,7 +448,7 @@ impl Task for SweepTask<'_> {
     unsafe fn run<S: Groups>(self) -> Result<(), Error> {
         let SweepTask { job, windows, slice } = self;
         // SAFETY: as the caller's.
-        unsafe { windows.find::<S::Pair>(job.points, job.options, slice) }
+        unsafe { windows.find::<S>(job.points, job.options, slice) }
     }
 }
 

@@ -15,7 +15,7 @@ use crate::cloud::Points;
 use crate::distance::{DIAGONAL, STRAIGHT, far};
 use crate::memory::{bytes, resize};
 use crate::options::Options;
-use crate::simd::Simd;
+use crate::simd::{Groups, Simd};
 use crate::smoothing_area::{LARGEST, SMALLEST, depth_smoothing};
 
 /// The windows of a slice of the image's rows, and what the sweep down keeps for the next slice.
@@ -107,7 +107,7 @@ impl Windows {
     /// # Safety
     /// The processor has the instruction set of `S`, which has sixteen lanes.
     #[inline(always)]
-    pub unsafe fn find<S: Simd>(
+    pub unsafe fn find<S: Groups>(
         &mut self,
         points: &Points,
         options: &Options,
@@ -240,14 +240,23 @@ impl Sweep {
     }
 
     /// Reads a row's depths.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
     #[inline(always)]
-    fn read_z(&mut self, points: &Points, order: LaneOrder, y: usize) {
+    unsafe fn read_z<S: Groups>(&mut self, points: &Points, order: LaneOrder, y: usize) {
         let place = Self::z_place(order, y);
         let z = &mut self.z[place];
         let (row, stride) = points.z_row(y);
-        // SAFETY: row y is inside the cloud, so it has a depth at every x below the width.
-        unsafe { order.read(row, stride, z) };
-        z[order.segment] = z[0].previous_lane(0.0);
+        let whole = points.row(y, 0..order.width).whole();
+        // SAFETY: as the caller's; row y is inside the cloud, so it has a depth at every x below the width, and as many of
+        // its points are whole.
+        unsafe {
+            order.read::<S::Widest>(row, stride, whole, z);
+            let first = z[0].load::<S::Pair>();
+            let following = <S::Pair>::previous_lane(first, <S::Pair>::splat(0.0));
+            z[order.segment].store::<S::Pair>(following);
+        }
     }
 
     /// Bytes held.
@@ -287,7 +296,7 @@ impl<'a> WindowRows<'a> {
     /// # Safety
     /// As [`Windows::find`].
     #[inline(always)]
-    unsafe fn sweep_down<S: Simd>(
+    unsafe fn sweep_down<S: Groups>(
         &mut self,
         points: &Points,
         options: &Options,
@@ -303,29 +312,34 @@ impl<'a> WindowRows<'a> {
             before = before.saturating_sub(1);
         }
         let factor = options.max_depth_change_factor;
+        // Nothing is farther apart than a NaN tells, nor than infinity.
+        let factor = if factor.is_nan() { f32::INFINITY } else { factor };
         let far = far(points.width(), points.height());
-        sweep.read_z(points, order, before);
+        // SAFETY: as the caller's.
+        unsafe { sweep.read_z::<S>(points, order, before) };
         for y in before..rows.end {
             let last = y + 1 == points.height();
             if !last {
-                sweep.read_z(points, order, y + 1);
+                // SAFETY: as the caller's.
+                unsafe { sweep.read_z::<S>(points, order, y + 1) };
             }
             let row = &mut self.row(y.max(rows.start))[1..];
             // SAFETY: as the caller's.
             let depths = unsafe {
                 if last {
-                    sweep.start_last_row::<S>(order, y, far, row)
+                    sweep.start_last_row::<S::Pair>(order, y, far, row)
                 } else {
-                    sweep.start_row::<S>(points, order, y, factor, row)
+                    sweep.start_row::<S::Pair>(points, order, y, factor, row)
                 }
             };
             swept[y] = Swept { depths, side: 0.0 };
             if y > self.first {
                 let (above, row) = self.two_rows(y - 1);
                 // SAFETY: as the caller's.
-                unsafe { forward::<S>(order, above, row, sweep.exact as f32) };
+                unsafe { forward::<S::Pair>(order, above, row, sweep.exact as f32) };
             }
-            close_ends(self.row(y.max(rows.start)), far);
+            // SAFETY: as the caller's.
+            unsafe { close_ends::<S::Pair>(self.row(y.max(rows.start)), far) };
         }
     }
 
@@ -335,7 +349,7 @@ impl<'a> WindowRows<'a> {
     /// # Safety
     /// As [`Windows::find`].
     #[inline(always)]
-    unsafe fn sweep_up<S: Simd>(
+    unsafe fn sweep_up<S: Groups>(
         &mut self,
         points: &Points,
         options: &Options,
@@ -352,14 +366,20 @@ impl<'a> WindowRows<'a> {
             if y > rows.start {
                 let (row, below) = self.two_rows(y - 1);
                 // SAFETY: as the caller's.
-                unsafe { backward::<S>(order, row, below, far, sweep.exact as f32) };
-                close_ends(row, far);
+                unsafe {
+                    backward::<S::Pair>(order, row, below, far, sweep.exact as f32);
+                    close_ends::<S::Pair>(row, far);
+                }
             }
             if y < end {
                 let row = self.row(y);
                 // SAFETY: as the caller's.
-                swept[y].side =
-                    unsafe { sweep.sides::<S>(points, options, smoothing, y, order, row) };
+                swept[y].side = unsafe {
+                    if smoothing.is_none() {
+                        sweep.read_z::<S>(points, order, y);
+                    }
+                    sweep.sides::<S::Pair>(points, options, smoothing, y, order, row)
+                };
             }
         }
     }
@@ -404,21 +424,18 @@ impl Sweep {
             let end = z[segment - 1].load::<S>();
             let end_right = z[segment].load::<S>();
             let bound = threshold::<S>(end, factor);
-            let change = is_change::<S>(end, S::finite(end), end_right, bound);
-            let mut ends = Lanes::ZERO;
-            ends.store::<S>(S::and(change, tested[segment - 1].load::<S>()));
-            let mut left = ends.next_lane(0.0).load::<S>();
+            let ends = change::<S>(end, end_right, bound, tested[segment - 1].load::<S>());
+            let mut left = S::next_lane(ends, S::splat(0.0));
             let mut own = z[0].load::<S>();
             for k in 0..segment {
                 points.prefetch_below(y, k * LANES, LANES);
                 let right = z[k + 1].load::<S>();
                 let (lower, upper) = (below[k].load::<S>(), above[k].load::<S>());
                 let tested = tested[k].load::<S>();
-                let finite = S::finite(own);
-                range = widened::<S>(range, own, finite);
+                range = widened::<S>(range, own);
                 let bound = threshold::<S>(own, factor);
-                let to_right = S::and(is_change::<S>(own, finite, right, bound), tested);
-                let to_lower = S::and(is_change::<S>(own, finite, lower, bound), tested);
+                let to_right = change::<S>(own, right, bound, tested);
+                let to_lower = change::<S>(own, lower, bound, tested);
                 let change = S::or(S::or(to_right, left), S::or(to_lower, upper));
                 row[k].store::<S>(S::and_not(change, far));
                 above[k].store::<S>(to_lower);
@@ -449,7 +466,7 @@ impl Sweep {
             for k in 0..order.segment {
                 let (above, own) = (self.above[k].load::<S>(), z[k].load::<S>());
                 row[k].store::<S>(S::and_not(above, S::splat(far)));
-                range = widened::<S>(range, own, S::finite(own));
+                range = widened::<S>(range, own);
             }
             let [least, largest] = range;
             [Floats::<S>(least).least(), Floats::<S>(largest).largest()]
@@ -457,7 +474,7 @@ impl Sweep {
     }
 
     /// Replaces a row's distances by the sides of its windows, pixel by pixel; none is larger than what is returned.
-    /// `smoothing` as [`one_smoothing`] says.
+    /// `smoothing` as [`one_smoothing`] says; if there is none, the row's depths have been read.
     ///
     /// # Safety
     /// As [`Sweep::start_row`].
@@ -472,9 +489,6 @@ impl Sweep {
         row: &mut [Lanes],
     ) -> f32 {
         let segment = order.segment;
-        if smoothing.is_none() {
-            self.read_z(points, order, y);
-        }
         let z = &self.z[Self::z_place(order, y)];
         let (distances, sides) = (&row[1..=segment], &mut self.sides[..segment]);
         // SAFETY: as the caller's; the sides fit i32.
@@ -537,18 +551,14 @@ fn one_smoothing([least, largest]: [f32; 2], options: &Options) -> Option<f32> {
     (least > largest || alike(first, last)).then_some(first)
 }
 
-/// The range of depths with another one, if it is finite.
+/// The range of depths with another one, if it is not NaN.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn widened<S: Simd>([least, largest]: [S::F; 2], z: S::F, finite: S::F) -> [S::F; 2] {
-    // SAFETY: as the caller's.
-    unsafe {
-        // A NaN is neither smaller nor larger.
-        let z = S::or(S::and_not(finite, S::splat(f32::NAN)), z);
-        [S::min(z, least), S::max(z, largest)]
-    }
+unsafe fn widened<S: Simd>([least, largest]: [S::F; 2], z: S::F) -> [S::F; 2] {
+    // SAFETY: as the caller's. A NaN is neither smaller nor larger.
+    unsafe { [S::min(z, least), S::max(z, largest)] }
 }
 
 /// `depth_change::threshold`
@@ -561,27 +571,30 @@ pub(super) unsafe fn threshold<S: Simd>(z: S::F, factor: S::F) -> S::F {
     unsafe { S::mul(S::mul(factor, S::add(S::abs(z), S::splat(1.0))), S::splat(2.0)) }
 }
 
-/// `depth_change::is_depth_change`, where `finite` says whether `z` is.
+/// `depth_change::is_depth_change`, where it is `tested`; depths that are not finite are NaN.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn is_change<S: Simd>(z: S::F, finite: S::F, neighbour: S::F, threshold: S::F) -> S::F {
+unsafe fn change<S: Simd>(z: S::F, neighbour: S::F, threshold: S::F, tested: S::F) -> S::F {
     // SAFETY: as the caller's.
-    unsafe {
-        let apart = S::lt(threshold, S::abs(S::sub(z, neighbour)));
-        let finite = S::and(finite, S::finite(neighbour));
-        S::or(apart, S::and_not(finite, S::splat(f32::from_bits(!0))))
-    }
+    unsafe { S::and_not(S::le(S::abs(S::sub(z, neighbour)), threshold), tested) }
 }
 
 /// Fills a row's first and last element with the neighbouring segments' ends.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
 #[inline(always)]
-fn close_ends(row: &mut [Lanes], far: f32) {
+unsafe fn close_ends<S: Simd>(row: &mut [Lanes], far: f32) {
     let last = row.len() - 1;
-    let (begin, end) = (row[1], row[last - 1]);
-    row[0] = end.next_lane(far);
-    row[last] = begin.previous_lane(far);
+    // SAFETY: as the caller's.
+    unsafe {
+        let far = S::splat(far);
+        let (begin, end) = (row[1].load::<S>(), row[last - 1].load::<S>());
+        row[0].store::<S>(S::next_lane(end, far));
+        row[last].store::<S>(S::previous_lane(begin, far));
+    }
 }
 
 /// The least of what an element's three neighbours in the next row over give, and its own value.
@@ -605,14 +618,37 @@ fn three(over: &[Lanes], at: usize) -> &[Lanes; 3] {
     over[at - 1..at + 2].first_chunk().expect("three elements")
 }
 
-/// The step along the row.
+/// What the next row over and the step along the row give these elements, one after the other, from the value `before` the
+/// first; returns the last one's.
+///
+/// Two at a time, as each waits for the one before: two steps are one of twice the length, to the bit. Floats round a sum
+/// only where it needs fewer bits behind the point, which it does at most once in two steps.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn along<S: Simd>(nearest: S::F, before: S::F) -> S::F {
+unsafe fn along<S: Simd>(
+    row: &mut [Lanes],
+    over: &[Lanes],
+    mut elements: impl Iterator<Item = usize>,
+    mut before: S::F,
+) -> S::F {
     // SAFETY: as the caller's.
-    unsafe { S::min(nearest, S::add(before, S::splat(STRAIGHT))) }
+    unsafe {
+        let (step, steps) = (S::splat(STRAIGHT), S::splat(2.0 * STRAIGHT));
+        while let Some(at) = elements.next() {
+            let first = nearest::<S>(&row[at], three(over, at));
+            let value = S::min(first, S::add(before, step));
+            row[at].store::<S>(value);
+            let Some(at) = elements.next() else {
+                return value;
+            };
+            let second = nearest::<S>(&row[at], three(over, at));
+            before = S::min(S::min(second, S::add(first, step)), S::add(before, steps));
+            row[at].store::<S>(before);
+        }
+        before
+    }
 }
 
 /// The forward pass over one row; `above` is done.
@@ -629,14 +665,15 @@ unsafe fn forward<S: Simd>(order: LaneOrder, above: &[Lanes], row: &mut [Lanes],
         let start = nearest::<S>(&row[1], three(above, 1));
         row[1].store::<S>(start);
         row[1].0[0] = first; // column 0 stays
-        let mut left = row[1].load::<S>();
-        for at in 2..=segment {
-            left = along::<S>(nearest::<S>(&row[at], three(above, at)), left);
-            row[at].store::<S>(left);
-        }
+        let start = row[1].load::<S>();
+        along::<S>(row, above, 2..=segment, start);
     }
+    let ends = |row: &[Lanes]| {
+        // SAFETY: as the caller's.
+        unsafe { S::next_lane(row[segment].load::<S>(), S::splat(f32::INFINITY)) }
+    };
     // SAFETY: as the caller's.
-    unsafe { carry::<S>(row, 1..=segment, |row| row[segment].next_lane(f32::INFINITY), exact) };
+    unsafe { carry::<S>(row, 1..=segment, ends, exact) };
     // The last column's upper right neighbour is column 0 of this row.
     wrap(order, row, order.width - 1, 0);
 }
@@ -659,22 +696,18 @@ unsafe fn backward<S: Simd>(
     let last = row[last_element + 1].0[last_lane];
     // SAFETY: as the caller's.
     unsafe {
-        let mut right = S::splat(far);
-        for at in (last_element + 1..=segment).rev() {
-            right = along::<S>(nearest::<S>(&row[at], three(below, at)), right);
-            row[at].store::<S>(right);
-        }
+        along::<S>(row, below, (last_element + 1..=segment).rev(), S::splat(far));
         row[last_element + 1].0[last_lane] = last; // the last column stays
-        right = row[last_element + 1].load::<S>();
-        for at in (1..=last_element).rev() {
-            right = along::<S>(nearest::<S>(&row[at], three(below, at)), right);
-            row[at].store::<S>(right);
-        }
+        let start = row[last_element + 1].load::<S>();
+        along::<S>(row, below, (1..=last_element).rev(), start);
     }
     let ends = |row: &[Lanes]| {
-        let mut ends = row[1].previous_lane(f32::INFINITY);
-        ends.0[last_lane..].fill(f32::INFINITY);
-        ends
+        // SAFETY: as the caller's.
+        unsafe {
+            let infinity = S::splat(f32::INFINITY);
+            let ends = S::previous_lane(row[1].load::<S>(), infinity);
+            S::select(S::mask((1 << last_lane) - 1), ends, infinity)
+        }
     };
     // SAFETY: as the caller's.
     unsafe { carry::<S>(row, (1..=segment).rev(), ends, exact) };
@@ -691,14 +724,14 @@ unsafe fn backward<S: Simd>(
 unsafe fn carry<S: Simd>(
     row: &mut [Lanes],
     segment: impl Iterator<Item = usize> + Clone,
-    ends: impl Fn(&[Lanes]) -> Lanes,
+    ends: impl Fn(&[Lanes]) -> S::F,
     exact: f32,
 ) {
     // SAFETY: as the caller's.
     unsafe {
         let exact = S::splat(exact);
         loop {
-            let mut value = ends(row).load::<S>();
+            let mut value = ends(row);
             for at in segment.clone() {
                 value = S::add(value, S::splat(STRAIGHT));
                 let own = row[at].load::<S>();
@@ -725,13 +758,16 @@ mod tests {
     use super::*;
     use crate::depth_change::depth_change_map;
     use crate::distance::distance_map;
-    use crate::simd::{portable::Portable, twice::Twice};
+    use crate::simd::portable::Portable;
     use crate::smoothing_area::window_side;
 
-    type S = Twice<Portable>;
-
-    /// Depths with steps and holes, three in so many `pixels`, the same for the same seed.
-    fn depths(width: usize, height: usize, pixels: u32, seed: u32) -> Vec<f32> {
+    /// Depths with steps and holes, three in so many `pixels`, and with extremes five, the same for the same seed.
+    fn depths(
+        (width, height): (usize, usize),
+        pixels: u32,
+        has_extremes: bool,
+        seed: u32,
+    ) -> Vec<f32> {
         let mut state = seed.wrapping_mul(2_654_435_761) | 1;
         let mut random = move || {
             state ^= state << 13;
@@ -744,6 +780,8 @@ mod tests {
                 0 => f32::NAN,
                 1 => 3.0,
                 2 => f32::INFINITY,
+                3 if has_extremes => f32::MAX,
+                4 if has_extremes => f32::MIN,
                 _ => 1.0,
             })
             .collect()
@@ -752,15 +790,28 @@ mod tests {
     #[test]
     fn the_sweeps_equal_the_plain_maps() {
         for width in (3..70).chain([640, 1024]) {
-            let cases = [(3, 1, 97), (4, 2, 97), (23, 3, 97), (50, 4, 97), (40, 5, 2003)];
-            for (height, seed, pixels) in cases {
-                let z = depths(width, height, pixels, seed * 1000 + width as u32);
+            let cases = [
+                (3, 1, 97, 0.02),
+                (4, 2, 97, 0.02),
+                (23, 3, 97, 0.02),
+                (50, 4, 97, 0.02),
+                (40, 5, 2003, 0.02),
+                // With extremes: thresholds that overflow, or are no numbers.
+                (23, 7, 97, 0.6),
+                (23, 9, 97, f32::INFINITY),
+                (23, 11, 97, f32::NAN),
+                (23, 13, 97, -1.0),
+            ];
+            for (height, seed, pixels, factor) in cases {
+                let of_width = seed * 1000 + width as u32;
+                let z = depths((width, height), pixels, seed > 5, of_width);
                 let points = Points::planes([&z, &z, &z], width, height, 0).unwrap();
                 let options = Options {
                     // With the fourth, depths decide.
                     normal_smoothing_size: if seed == 4 { 9.8 } else { 9.5 },
                     border_policy: crate::BorderPolicy::Mirror,
                     depth_dependent_smoothing: seed % 2 == 0,
+                    max_depth_change_factor: factor,
                     ..Options::default()
                 };
                 let changes = depth_change_map(&points, options.max_depth_change_factor).unwrap();
@@ -776,7 +827,7 @@ mod tests {
                 windows.start(&points, &options, 1, expected).unwrap();
                 for slice in slices {
                     // SAFETY: the portable path runs everywhere.
-                    unsafe { windows.find::<S>(&points, &options, slice.clone()) }.unwrap();
+                    unsafe { windows.find::<Portable>(&points, &options, slice.clone()) }.unwrap();
                     let sides = windows.sides(width);
                     for y in slice {
                         let mut largest = 0;

@@ -38,12 +38,15 @@ impl Simd for Avx512 {
         min(a: Self::F, b: Self::F) -> Self::F = Avx2::min;
         max(a: Self::F, b: Self::F) -> Self::F = Avx2::max;
         lt(a: Self::F, b: Self::F) -> Self::F = Avx2::lt;
+        le(a: Self::F, b: Self::F) -> Self::F = Avx2::le;
         eq(a: Self::F, b: Self::F) -> Self::F = Avx2::eq;
         and(a: Self::F, b: Self::F) -> Self::F = Avx2::and;
         or(a: Self::F, b: Self::F) -> Self::F = Avx2::or;
         xor(a: Self::F, b: Self::F) -> Self::F = Avx2::xor;
         and_not(mask: Self::F, a: Self::F) -> Self::F = Avx2::and_not;
         select(mask: Self::F, yes: Self::F, no: Self::F) -> Self::F = Avx2::select;
+        next_lane(a: Self::F, before: Self::F) -> Self::F = Avx2::next_lane;
+        previous_lane(a: Self::F, after: Self::F) -> Self::F = Avx2::previous_lane;
         bits(mask: Self::F) -> u32 = Avx2::bits;
 
         load_i(from: *const i32) -> Self::I = Avx2::load_i;
@@ -91,6 +94,7 @@ impl Simd for Avx512 {
 impl Along for Avx512 {
     calls! {
         load_fours(place: impl Fn(usize) -> *const f32) -> Self::F = Avx2::load_fours;
+        store_fours(value: Self::F, place: impl Fn(usize) -> *mut f32) = Avx2::store_fours;
         transpose_fours(rows: [Self::F; 4]) -> [Self::F; 4] = Avx2::transpose_fours;
         prefix_sum_i(a: Self::I) -> Self::I = Avx2::prefix_sum_i;
         last_i(a: Self::I) -> Self::I = Avx2::last_i;
@@ -223,12 +227,30 @@ impl Simd for Avx512Pair {
         unsafe { _mm512_castsi512_ps(_mm512_movm_epi32(bits as u16)) }
     }
     #[inline(always)]
+    unsafe fn next_lane(a: Self::F, before: Self::F) -> Self::F {
+        unsafe {
+            let (a, before) = (_mm512_castps_si512(a), _mm512_castps_si512(before));
+            _mm512_castsi512_ps(_mm512_alignr_epi32::<15>(a, before))
+        }
+    }
+    #[inline(always)]
+    unsafe fn previous_lane(a: Self::F, after: Self::F) -> Self::F {
+        unsafe {
+            let (a, after) = (_mm512_castps_si512(a), _mm512_castps_si512(after));
+            _mm512_castsi512_ps(_mm512_alignr_epi32::<1>(after, a))
+        }
+    }
+    #[inline(always)]
     unsafe fn bits(mask: Self::F) -> u32 {
         unsafe { u32::from(_mm512_movepi32_mask(_mm512_castps_si512(mask))) }
     }
     #[inline(always)]
     unsafe fn lt(a: Self::F, b: Self::F) -> Self::F {
         unsafe { Self::mask(u32::from(_mm512_cmp_ps_mask::<_CMP_LT_OQ>(a, b))) }
+    }
+    #[inline(always)]
+    unsafe fn le(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { Self::mask(u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(a, b))) }
     }
     #[inline(always)]
     unsafe fn eq(a: Self::F, b: Self::F) -> Self::F {
@@ -326,6 +348,15 @@ impl Along for Avx512Pair {
             let fours = _mm512_insertf32x4::<1>(fours, _mm_loadu_ps(place(1)));
             let fours = _mm512_insertf32x4::<2>(fours, _mm_loadu_ps(place(2)));
             _mm512_insertf32x4::<3>(fours, _mm_loadu_ps(place(3)))
+        }
+    }
+    #[inline(always)]
+    unsafe fn store_fours(value: Self::F, place: impl Fn(usize) -> *mut f32) {
+        unsafe {
+            _mm_storeu_ps(place(0), _mm512_castps512_ps128(value));
+            _mm_storeu_ps(place(1), _mm512_extractf32x4_ps::<1>(value));
+            _mm_storeu_ps(place(2), _mm512_extractf32x4_ps::<2>(value));
+            _mm_storeu_ps(place(3), _mm512_extractf32x4_ps::<3>(value));
         }
     }
     #[inline(always)]

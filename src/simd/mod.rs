@@ -82,6 +82,8 @@ pub(crate) trait Simd: Copy {
     unsafe fn max(a: Self::F, b: Self::F) -> Self::F;
     /// The mask `a < b`, false where one is NaN.
     unsafe fn lt(a: Self::F, b: Self::F) -> Self::F;
+    /// The mask `a <= b`, false where one is NaN.
+    unsafe fn le(a: Self::F, b: Self::F) -> Self::F;
     /// The mask `a == b`.
     unsafe fn eq(a: Self::F, b: Self::F) -> Self::F;
     unsafe fn and(a: Self::F, b: Self::F) -> Self::F;
@@ -89,6 +91,10 @@ pub(crate) trait Simd: Copy {
     unsafe fn xor(a: Self::F, b: Self::F) -> Self::F;
     /// `!mask & a`
     unsafe fn and_not(mask: Self::F, a: Self::F) -> Self::F;
+    /// Every lane takes the value of the one before, the first that of the last one of `before`.
+    unsafe fn next_lane(a: Self::F, before: Self::F) -> Self::F;
+    /// Every lane takes the value of the one after, the last that of the first one of `after`.
+    unsafe fn previous_lane(a: Self::F, after: Self::F) -> Self::F;
     /// Bit l is lane l of a mask.
     unsafe fn bits(mask: Self::F) -> u32;
 
@@ -172,6 +178,8 @@ pub(crate) trait Simd: Copy {
 pub(crate) trait Along: Simd {
     /// Four lanes from the first place, four from the next, and so on.
     unsafe fn load_fours(place: impl Fn(usize) -> *const f32) -> Self::F;
+    /// Stores four lanes to the first place, four to the next, and so on.
+    unsafe fn store_fours(value: Self::F, place: impl Fn(usize) -> *mut f32);
     /// Lane i of row j becomes lane j of row i, among each four lanes.
     unsafe fn transpose_fours(rows: [Self::F; 4]) -> [Self::F; 4];
 

@@ -87,6 +87,10 @@ impl Simd for Neon {
         unsafe { each!(2 vreinterpretq_f32_u32, each!(2 vcltq_f32, a, b)) }
     }
     #[inline(always)]
+    unsafe fn le(a: Self::F, b: Self::F) -> Self::F {
+        unsafe { each!(2 vreinterpretq_f32_u32, each!(2 vcleq_f32, a, b)) }
+    }
+    #[inline(always)]
     unsafe fn eq(a: Self::F, b: Self::F) -> Self::F {
         unsafe { each!(2 vreinterpretq_f32_u32, each!(2 vceqq_f32, a, b)) }
     }
@@ -105,6 +109,14 @@ impl Simd for Neon {
     #[inline(always)]
     unsafe fn and_not(mask: Self::F, a: Self::F) -> Self::F {
         unsafe { bitwise!(vbicq_u32, a, mask) }
+    }
+    #[inline(always)]
+    unsafe fn next_lane(a: Self::F, before: Self::F) -> Self::F {
+        unsafe { [vextq_f32::<3>(before[1], a[0]), vextq_f32::<3>(a[0], a[1])] }
+    }
+    #[inline(always)]
+    unsafe fn previous_lane(a: Self::F, after: Self::F) -> Self::F {
+        unsafe { [vextq_f32::<1>(a[0], a[1]), vextq_f32::<1>(a[1], after[0])] }
     }
     #[inline(always)]
     unsafe fn bits(mask: Self::F) -> u32 {
@@ -218,6 +230,12 @@ impl Along for Neon {
     #[inline(always)]
     unsafe fn load_fours(place: impl Fn(usize) -> *const f32) -> Self::F {
         unsafe { [vld1q_f32(place(0)), vld1q_f32(place(1))] }
+    }
+    #[inline(always)]
+    unsafe fn store_fours(value: Self::F, place: impl Fn(usize) -> *mut f32) {
+        for (half, four) in value.into_iter().enumerate() {
+            unsafe { vst1q_f32(place(half), four) };
+        }
     }
     #[inline(always)]
     unsafe fn transpose_fours(rows: [Self::F; 4]) -> [Self::F; 4] {

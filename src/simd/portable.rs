@@ -63,6 +63,15 @@ unsafe fn load_fours<T: Copy>(place: impl Fn(usize) -> *const T) -> [T; GROUP] {
 }
 
 #[inline(always)]
+unsafe fn store_fours<T: Copy>(value: [T; GROUP], place: impl Fn(usize) -> *mut T) {
+    let (fours, _) = value.as_chunks::<4>();
+    for (half, four) in fours.iter().enumerate() {
+        // SAFETY: promised by the caller.
+        unsafe { place(half).cast::<[T; 4]>().write_unaligned(*four) };
+    }
+}
+
+#[inline(always)]
 fn transpose_fours<T: Copy>(rows: [[T; GROUP]; 4]) -> [[T; GROUP]; 4] {
     let mut columns = rows;
     for (i, column) in columns.iter_mut().enumerate() {
@@ -126,6 +135,10 @@ impl Simd for Portable {
         mask(a, b, |a, b| a < b)
     }
     #[inline(always)]
+    unsafe fn le(a: F, b: F) -> F {
+        mask(a, b, |a, b| a <= b)
+    }
+    #[inline(always)]
     unsafe fn eq(a: F, b: F) -> F {
         mask(a, b, |a, b| a == b)
     }
@@ -144,6 +157,14 @@ impl Simd for Portable {
     #[inline(always)]
     unsafe fn and_not(mask: F, a: F) -> F {
         bitwise(mask, a, |mask, a| !mask & a)
+    }
+    #[inline(always)]
+    unsafe fn next_lane(a: F, before: F) -> F {
+        std::array::from_fn(|l| if l == 0 { before[GROUP - 1] } else { a[l - 1] })
+    }
+    #[inline(always)]
+    unsafe fn previous_lane(a: F, after: F) -> F {
+        std::array::from_fn(|l| if l == GROUP - 1 { after[0] } else { a[l + 1] })
     }
     #[inline(always)]
     unsafe fn bits(mask: F) -> u32 {
@@ -262,6 +283,11 @@ impl Along for Portable {
         unsafe { load_fours(place) }
     }
     #[inline(always)]
+    unsafe fn store_fours(value: F, place: impl Fn(usize) -> *mut f32) {
+        // SAFETY: promised by the caller.
+        unsafe { store_fours(value, place) };
+    }
+    #[inline(always)]
     unsafe fn transpose_fours(rows: [F; 4]) -> [F; 4] {
         transpose_fours(rows)
     }
@@ -293,11 +319,8 @@ impl Groups for Portable {
     }
     #[inline(always)]
     unsafe fn store_fours_d(value: D, place: impl Fn(usize) -> *mut f64) {
-        let (fours, _) = value.as_chunks::<4>();
-        for (half, four) in fours.iter().enumerate() {
-            // SAFETY: promised by the caller.
-            unsafe { place(half).cast::<[f64; 4]>().write_unaligned(*four) };
-        }
+        // SAFETY: promised by the caller.
+        unsafe { store_fours(value, place) };
     }
     #[inline(always)]
     unsafe fn transpose_fours_d(rows: [D; 4]) -> [D; 4] {

@@ -94,11 +94,14 @@ unsafe fn of_lanes<S: Simd>(a: &[f32; 16], b: &[f32; 16]) -> Results {
             S::sqrt(x),
             S::min(x, y),
             S::max(x, y),
+            S::le(x, y),
             S::and(x, y),
             S::or(x, y),
             S::xor(x, y),
             S::and_not(x, y),
             S::select(S::mask(bits), x, y),
+            S::next_lane(x, y),
+            S::previous_lane(x, y),
             S::abs(x),
             S::finite(x),
             S::narrow(S::mul_d(dx, tenth)),
@@ -183,6 +186,13 @@ unsafe fn assert_goes_along<S: Along>() {
         let from = floats.as_ptr();
         found.floats::<S>([S::load_fours(|four| from.add(101 - 7 * four))]);
         expected.0.extend((0..S::LANES).map(|l| bits(&floats[101 - 7 * (l / 4) + l % 4])));
+
+        let (mut fours, mut stored) = ([0.0; 20], [0.0; 20]);
+        let to = fours.as_mut_ptr();
+        S::store_fours(S::load(from), |four| to.add(15 - 5 * four));
+        (0..S::LANES).for_each(|l| stored[15 - 5 * (l / 4) + l % 4] = floats[l]);
+        found.0.extend(fours.iter().map(bits));
+        expected.0.extend(stored.iter().map(bits));
 
         let rows = [0, 1, 2, 3].map(|row| S::load(from.add(16 * row)));
         found.floats::<S>(S::transpose_fours(rows));

@@ -31,6 +31,7 @@ impl<S: Simd> Simd for Twice<S> {
         min(a: F, b: F) -> F;
         max(a: F, b: F) -> F;
         lt(a: F, b: F) -> F;
+        le(a: F, b: F) -> F;
         eq(a: F, b: F) -> F;
         and(a: F, b: F) -> F;
         or(a: F, b: F) -> F;
@@ -129,6 +130,16 @@ impl<S: Simd> Simd for Twice<S> {
     unsafe fn mask(bits: u32) -> Self::F {
         // SAFETY: as the caller's.
         unsafe { [S::mask(bits), S::mask(bits >> super::GROUP)] }
+    }
+    #[inline(always)]
+    unsafe fn next_lane(a: Self::F, before: Self::F) -> Self::F {
+        // SAFETY: as the caller's.
+        unsafe { [S::next_lane(a[0], before[1]), S::next_lane(a[1], a[0])] }
+    }
+    #[inline(always)]
+    unsafe fn previous_lane(a: Self::F, after: Self::F) -> Self::F {
+        // SAFETY: as the caller's.
+        unsafe { [S::previous_lane(a[0], a[1]), S::previous_lane(a[1], after[0])] }
     }
     #[inline(always)]
     unsafe fn bits(mask: Self::F) -> u32 {

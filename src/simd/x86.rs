@@ -69,6 +69,7 @@ impl Simd for Sse2 {
         min(a: Self::F, b: Self::F) -> Self::F = _mm_min_ps;
         max(a: Self::F, b: Self::F) -> Self::F = _mm_max_ps;
         lt(a: Self::F, b: Self::F) -> Self::F = _mm_cmplt_ps;
+        le(a: Self::F, b: Self::F) -> Self::F = _mm_cmple_ps;
         eq(a: Self::F, b: Self::F) -> Self::F = _mm_cmpeq_ps;
         and(a: Self::F, b: Self::F) -> Self::F = _mm_and_ps;
         or(a: Self::F, b: Self::F) -> Self::F = _mm_or_ps;
@@ -104,6 +105,22 @@ impl Simd for Sse2 {
             _mm_storeu_ps(to, value[0]);
             _mm_storeu_ps(to.add(4), value[1]);
         }
+    }
+    #[inline(always)]
+    unsafe fn next_lane(a: Self::F, before: Self::F) -> Self::F {
+        #[inline(always)]
+        unsafe fn half(a: __m128, before: __m128) -> __m128 {
+            unsafe { _mm_shuffle_ps::<0x98>(_mm_shuffle_ps::<0x0f>(before, a), a) }
+        }
+        unsafe { [half(a[0], before[1]), half(a[1], a[0])] }
+    }
+    #[inline(always)]
+    unsafe fn previous_lane(a: Self::F, after: Self::F) -> Self::F {
+        #[inline(always)]
+        unsafe fn half(a: __m128, after: __m128) -> __m128 {
+            unsafe { _mm_shuffle_ps::<0x89>(a, _mm_shuffle_ps::<0x0f>(a, after)) }
+        }
+        unsafe { [half(a[0], a[1]), half(a[1], after[0])] }
     }
     #[inline(always)]
     unsafe fn bits(mask: Self::F) -> u32 {
@@ -215,6 +232,12 @@ impl Along for Sse2 {
     #[inline(always)]
     unsafe fn load_fours(place: impl Fn(usize) -> *const f32) -> Self::F {
         unsafe { [_mm_loadu_ps(place(0)), _mm_loadu_ps(place(1))] }
+    }
+    #[inline(always)]
+    unsafe fn store_fours(value: Self::F, place: impl Fn(usize) -> *mut f32) {
+        for (half, four) in value.into_iter().enumerate() {
+            unsafe { _mm_storeu_ps(place(half), four) };
+        }
     }
     #[inline(always)]
     unsafe fn transpose_fours(rows: [Self::F; 4]) -> [Self::F; 4] {
@@ -369,6 +392,7 @@ impl Simd for Avx2 {
         min(a: Self::F, b: Self::F) -> Self::F = _mm256_min_ps;
         max(a: Self::F, b: Self::F) -> Self::F = _mm256_max_ps;
         lt(a: Self::F, b: Self::F) -> Self::F = _mm256_cmp_ps::<_CMP_LT_OQ>;
+        le(a: Self::F, b: Self::F) -> Self::F = _mm256_cmp_ps::<_CMP_LE_OQ>;
         eq(a: Self::F, b: Self::F) -> Self::F = _mm256_cmp_ps::<_CMP_EQ_OQ>;
         and(a: Self::F, b: Self::F) -> Self::F = _mm256_and_ps;
         or(a: Self::F, b: Self::F) -> Self::F = _mm256_or_ps;
@@ -391,6 +415,20 @@ impl Simd for Avx2 {
         max_d(a: Self::D, b: Self::D) -> Self::D = _mm256_max_pd;
     }
 
+    #[inline(always)]
+    unsafe fn next_lane(a: Self::F, before: Self::F) -> Self::F {
+        unsafe {
+            let halves = _mm256_castps_si256(_mm256_permute2f128_ps::<0x21>(before, a));
+            _mm256_castsi256_ps(_mm256_alignr_epi8::<12>(_mm256_castps_si256(a), halves))
+        }
+    }
+    #[inline(always)]
+    unsafe fn previous_lane(a: Self::F, after: Self::F) -> Self::F {
+        unsafe {
+            let halves = _mm256_castps_si256(_mm256_permute2f128_ps::<0x21>(a, after));
+            _mm256_castsi256_ps(_mm256_alignr_epi8::<4>(halves, _mm256_castps_si256(a)))
+        }
+    }
     #[inline(always)]
     unsafe fn bits(mask: Self::F) -> u32 {
         unsafe { _mm256_movemask_ps(mask) as u32 }
@@ -489,6 +527,10 @@ impl Along for Avx2 {
     #[inline(always)]
     unsafe fn load_fours(place: impl Fn(usize) -> *const f32) -> Self::F {
         unsafe { _mm256_loadu2_m128(place(1), place(0)) }
+    }
+    #[inline(always)]
+    unsafe fn store_fours(value: Self::F, place: impl Fn(usize) -> *mut f32) {
+        unsafe { _mm256_storeu2_m128(place(1), place(0), value) };
     }
     #[inline(always)]
     unsafe fn transpose_fours([a, b, c, d]: [Self::F; 4]) -> [Self::F; 4] {
