@@ -208,19 +208,20 @@ impl Tile<'_> {
         sums: &mut M,
         sink: &Sink,
     ) {
-        // SAFETY: as the caller's.
-        let side = unsafe { self.largest_side::<S>() };
-        if side == 0 || self.layers.len() > 1 {
+        if self.layers.len() > 1 {
             // SAFETY: as the caller's. One layer of several writes its own pixels only.
             unsafe { self.write_none::<S>(sink) };
         }
-        if side == 0 {
-            return;
-        }
         let size = (self.image.width, self.image.height);
         for layer in self.layers {
-            let Some(origin) = self.origin(layer) else { continue };
-            let side = side.min(layer.side);
+            let Some(origin) = self.origin(layer) else {
+                if layer.is_all() {
+                    // SAFETY: as the caller's.
+                    unsafe { self.write_none::<S>(sink) };
+                }
+                continue;
+            };
+            let side = layer.side;
             *frame = Frame::around(&self.columns, &self.rows, side, size);
             // Seldom is a point farther from the camera's axis than the deepest one from the camera.
             let (first, mut limit) =
@@ -228,9 +229,8 @@ impl Tile<'_> {
             sums.start(frame, layer.deepest, side, first);
             loop {
                 // SAFETY: as the caller's.
-                let done = unsafe {
-                    self.rows::<S, M>(frame, planes, sums, sink, (layer, side), (origin, limit))
-                };
+                let done =
+                    unsafe { self.rows::<S, M>(frame, planes, sums, sink, layer, (origin, limit)) };
                 let Err(BeyondLimit) = done else { break };
                 // SAFETY: as the caller's.
                 let extent = unsafe { self.extent::<S>(frame, planes, layer, origin) };
@@ -315,10 +315,10 @@ impl Tile<'_> {
         planes: &mut Planes,
         sums: &mut M,
         sink: &Sink,
-        (layer, side): (&Layer, usize),
+        layer: &Layer,
         (origin, limit): ([f32; 3], f32),
     ) -> Result<(), BeyondLimit> {
-        let held = layer.held;
+        let &Layer { held, side, .. } = layer;
         let mut run = Run::default();
         let (before, after) = window_reach(side);
         let mut next = frame.rows.start;
@@ -345,31 +345,11 @@ impl Tile<'_> {
         Ok(())
     }
 
-    /// The largest side of a window in the tile.
-    ///
-    /// # Safety
-    /// As [`Tile::compute`].
-    #[inline(always)]
-    unsafe fn largest_side<S: Groups>(&self) -> usize {
-        // SAFETY: as the caller's; a row of sides is readable up to a whole group, and other pixels' sides do no harm.
-        unsafe {
-            let mut largest = S::splat(0.0);
-            for y in self.rows.clone() {
-                let row = self.sides.row(y).as_ptr();
-                let inside = self.columns.end - self.columns.len() % GROUP;
-                for x in (self.columns.start..inside).step_by(GROUP) {
-                    largest = S::max(largest, S::load(row.add(x)));
-                }
-                for x in inside..self.columns.end {
-                    largest = S::max(largest, S::splat(*row.add(x)));
-                }
-            }
-            Floats::<S>(largest).largest() as usize
-        }
-    }
-
     /// A finite point of a layer near the tile's middle, if the layer has a window: sums about it lose less.
     fn origin(&self, layer: &Layer) -> Option<[f32; 3]> {
+        if layer.side == 0 {
+            return None;
+        }
         for y in from_middle(&self.rows) {
             let has_window =
                 |x: &usize| self.sides.row(y)[*x] > 0.0 && layer.has(self.points.z(*x, y));
