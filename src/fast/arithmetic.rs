@@ -41,6 +41,13 @@ operators!(Floats, Add, add, add; Sub, sub, sub; Mul, mul, mul; Div, div, div;);
 operators!(Doubles, Add, add, add_d; Sub, sub, sub_d; Mul, mul, mul_d; Div, div, div_d;);
 operators!(Integers, Add, add, add_i; Sub, sub, sub_i;);
 
+/// What lies between a window's corners, above and below, each left and right, where integral rows hold what `at` says.
+#[inline(always)]
+pub(crate) fn between<C, T: Sub<Output = T>>(corners: [[C; 2]; 2], at: impl Fn(C) -> T) -> T {
+    let [[above_left, above_right], [below_left, below_right]] = corners;
+    (at(below_right) - at(below_left)) - (at(above_right) - at(above_left))
+}
+
 impl<S: Simd> Floats<S> {
     /// # Safety
     /// The processor has the instruction set of `S`.

@@ -4,7 +4,7 @@
 //! The integers are multiples of a power of two: their sums are exact whatever wraps around between, as long as the
 //! differences fit, and the limit on the coordinates sees to that.
 
-use super::arithmetic::Floats;
+use super::arithmetic::{Floats, Integers, between};
 use super::lanes::LANES;
 use super::planes::Frame;
 use super::run::{Noted, RUN};
@@ -32,7 +32,7 @@ pub(crate) fn place(frame: &Frame, y: usize, [row, column]: [isize; 2]) -> usize
 
 /// The left corners of windows of a side, as [`place`] has them.
 pub(crate) trait LeftCorners: Copy {
-    /// Both gradients of one window or of several, as [`between`].
+    /// Both gradients of one window or of several, as [`sum_between`].
     ///
     /// # Safety
     /// As there.
@@ -41,7 +41,7 @@ pub(crate) trait LeftCorners: Copy {
     /// The same where the next window may have any other side: without a branch that nobody could predict.
     ///
     /// # Safety
-    /// As [`between`].
+    /// As [`sum_between`].
     #[inline(always)]
     unsafe fn gradients_of_one<S: Simd>(self, pixel: *const Both<i32>, side: usize) -> S::I {
         // SAFETY: as the caller's.
@@ -55,16 +55,15 @@ pub(crate) trait LeftCorners: Copy {
 /// # Safety
 /// The processor has the instruction set of `S`; the ring holds the corners.
 #[inline(always)]
-pub(crate) unsafe fn between<S: Simd>(
+pub(crate) unsafe fn sum_between<S: Simd>(
     pixel: *const Both<i32>,
     [above, below]: [usize; 2],
     columns: usize,
 ) -> S::I {
     // SAFETY: as the caller's.
     unsafe {
-        let at = |corner: usize| S::load_i(pixel.wrapping_byte_add(corner).cast());
-        let difference = |left: usize| S::sub_i(at(left.wrapping_add(PIXEL * columns)), at(left));
-        S::sub_i(difference(below), difference(above))
+        let at = |corner: usize| Integers::<S>(S::load_i(pixel.wrapping_byte_add(corner).cast()));
+        between([above, below].map(|left| [left, left.wrapping_add(PIXEL * columns)]), at).0
     }
 }
 

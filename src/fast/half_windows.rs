@@ -2,7 +2,7 @@
 //!
 //! It is of integers or of f64, as `depth` says. Half windows of one point are read from the points: exactly.
 
-use super::arithmetic::Floats;
+use super::arithmetic::{Floats, between};
 use super::buffer::Buffer;
 use super::by_side;
 use super::depth::Depth;
@@ -80,8 +80,8 @@ unsafe fn sum_between<S: Simd, T: Lane>(
 ) -> T::Of<S> {
     // SAFETY: as the caller's.
     unsafe {
-        let at = |row: *const T, column: isize| T::load::<S>(row.wrapping_offset(column));
-        (at(below, right) - at(below, left)) - (at(above, right) - at(above, left))
+        let corners = [above, below].map(|row| [left, right].map(|at| row.wrapping_offset(at)));
+        between(corners, |corner| T::load::<S>(corner))
     }
 }
 

@@ -1,9 +1,7 @@
 //! Sums of first and second moments, for COVARIANCE_MATRIX: the paper's nine integral images (Eq. 16-25), in f64 and
 //! about a point of the tile.
 
-use std::ops::Sub;
-
-use super::arithmetic::{Doubles, Floats};
+use super::arithmetic::{Doubles, Floats, between};
 use super::buffer::Buffer;
 use super::lanes::LANES;
 use super::planes::{Frame, MARGIN, Planes};
@@ -50,13 +48,6 @@ struct Place {
 
 /// Of what is above and below, left and right. Before a pixel's column is added, places may be wrapped around zero.
 type Corners = [[usize; 2]; 2];
-
-/// What lies between corners, where integral rows hold what `at` says.
-#[inline(always)]
-fn between<T: Sub<Output = T>>(corners: Corners, at: impl Fn(usize) -> T) -> T {
-    let [above, below] = corners.map(|[left, right]| at(right) - at(left));
-    below - above
-}
 
 /// The sums of most moments of the window of a pixel.
 ///

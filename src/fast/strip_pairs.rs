@@ -6,7 +6,7 @@
 //! whatever the windows of its neighbours.
 
 use super::buffer::Buffer;
-use super::gradients::{Both, Gradients, LeftCorners, PIXEL, Scale, VERTICAL, between, place};
+use super::gradients::{Both, Gradients, LeftCorners, PIXEL, Scale, VERTICAL, place, sum_between};
 use super::planes::{Frame, MARGIN, Planes};
 use super::tile::{Bits, Found, Pair, Sums, Tile};
 use crate::Error;
@@ -130,7 +130,7 @@ impl LeftCorners for [usize; 2] {
     #[inline(always)]
     unsafe fn gradients<S: Simd>(self, pixel: *const Both<i32>, side: usize) -> S::I {
         // SAFETY: as the caller's.
-        unsafe { between::<S>(pixel, self, side) }
+        unsafe { sum_between::<S>(pixel, self, side) }
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::buffer::Buffer;
 use super::gradients::{
-    Both, Gradients, HORIZONTAL, LeftCorners, PIXEL, Scale, VERTICAL, between, place,
+    Both, Gradients, HORIZONTAL, LeftCorners, PIXEL, Scale, VERTICAL, place, sum_between,
 };
 use super::planes::{Frame, MARGIN, Planes};
 use super::tile::{Found, Pair, Sums, Tile};
@@ -68,7 +68,7 @@ impl LeftCorners for [usize; 3] {
         unsafe {
             if side.is_multiple_of(2) {
                 let [above, below, _] = self;
-                return between::<S>(pixel, [above, below], side);
+                return sum_between::<S>(pixel, [above, below], side);
             }
             self.gradients_of_one::<S>(pixel, side)
         }
@@ -79,8 +79,8 @@ impl LeftCorners for [usize; 3] {
         let [above, horizontal, vertical] = self;
         // SAFETY: as the caller's.
         unsafe {
-            let both = between::<S>(pixel, [above, horizontal], side & !1);
-            S::select_i(HORIZONTAL, both, between::<S>(pixel, [above, vertical], side))
+            let both = sum_between::<S>(pixel, [above, horizontal], side & !1);
+            S::select_i(HORIZONTAL, both, sum_between::<S>(pixel, [above, vertical], side))
         }
     }
 }
