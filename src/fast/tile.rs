@@ -351,10 +351,12 @@ impl Tile<'_> {
             return None;
         }
         for y in from_middle(&self.rows) {
-            let has_window =
-                |x: &usize| self.sides.row(y)[*x] > 0.0 && layer.has(self.points.z(*x, y));
-            if let Some(x) = from_middle(&self.columns).find(has_window) {
-                return Some(self.points.at(x, y).map(|c| if c.is_finite() { c } else { 0.0 }));
+            let sides = self.sides.row(y);
+            for x in from_middle(&self.columns) {
+                if sides[x] > 0.0 && layer.has(self.points.z(x, y)) {
+                    let point = self.points.at(x, y);
+                    return Some(point.map(|c| if c.is_finite() { c } else { 0.0 }));
+                }
             }
         }
         None
