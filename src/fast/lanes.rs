@@ -80,8 +80,8 @@ impl LaneOrder {
         (x % self.segment, x / self.segment)
     }
 
-    /// Reads a row of points' depths, `stride` bytes apart, into lane order, and zeros past the row's end. The first `whole`
-    /// points, side by side, have x and y before z and four bytes behind it, which can be read.
+    /// Reads a row of points' depths, `stride` bytes apart, into lane order, NaN for those that are not finite, and zeros past
+    /// the row's end. The first `whole` points have x and y before z and four bytes behind it, which can be read.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`; `row` is valid for `width` reads, and for those of whole points.
@@ -110,9 +110,9 @@ impl LaneOrder {
                     let first = from.sub(2);
                     let four = [0, 1, 2, 3].map(|l| S::load(first.byte_add(l * lane_stride)));
                     let [_, _, z, _] = S::transpose_fours(four);
-                    S::store_fours(S::add(z, S::sub(z, z)), |point| {
-                        to.add((element + point) * LANES + lane)
-                    });
+                    let finite_or_nan = S::add(z, S::sub(z, z));
+                    let to = |point: usize| to.add((element + point) * LANES + lane);
+                    S::store_fours(finite_or_nan, to);
                 }
                 from = from.wrapping_byte_add(points * stride);
             }

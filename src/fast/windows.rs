@@ -105,7 +105,7 @@ impl Windows {
     /// Finds the sides of the windows of a slice. Costs least if it follows the one before.
     ///
     /// # Safety
-    /// The processor has the instruction set of `S`, which has sixteen lanes.
+    /// The processor has the instruction set of `S`.
     #[inline(always)]
     pub unsafe fn find<S: Groups>(
         &mut self,
@@ -619,10 +619,10 @@ fn three(over: &[Lanes], at: usize) -> &[Lanes; 3] {
 }
 
 /// What the next row over and the step along the row give these elements, one after the other, from the value `before` the
-/// first; returns the last one's.
+/// first.
 ///
-/// Two at a time, as each waits for the one before: two steps are one of twice the length, to the bit. Floats round a sum
-/// only where it needs fewer bits behind the point, which it does at most once in two steps.
+/// Two at a time, as each waits for the one before: two steps are one of twice the length, to the bit. Distances are 0 or at
+/// least 1, where a step is rounded only if the sum has fewer bits behind the point: of two steps, once at most.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
@@ -632,7 +632,7 @@ unsafe fn along<S: Simd>(
     over: &[Lanes],
     mut elements: impl Iterator<Item = usize>,
     mut before: S::F,
-) -> S::F {
+) {
     // SAFETY: as the caller's.
     unsafe {
         let (step, steps) = (S::splat(STRAIGHT), S::splat(2.0 * STRAIGHT));
@@ -640,14 +640,11 @@ unsafe fn along<S: Simd>(
             let first = nearest::<S>(&row[at], three(over, at));
             let value = S::min(first, S::add(before, step));
             row[at].store::<S>(value);
-            let Some(at) = elements.next() else {
-                return value;
-            };
+            let Some(at) = elements.next() else { return };
             let second = nearest::<S>(&row[at], three(over, at));
             before = S::min(S::min(second, S::add(first, step)), S::add(before, steps));
             row[at].store::<S>(before);
         }
-        before
     }
 }
 
@@ -785,6 +782,14 @@ mod tests {
                 _ => 1.0,
             })
             .collect()
+    }
+
+    #[test]
+    fn two_steps_along_the_row_are_one() {
+        for bits in (1.0_f32.to_bits()..LARGEST.to_bits()).step_by(101) {
+            let distance = f32::from_bits(bits);
+            assert_eq!(distance + STRAIGHT + STRAIGHT, distance + 2.0 * STRAIGHT);
+        }
     }
 
     #[test]
