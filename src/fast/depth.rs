@@ -142,7 +142,7 @@ impl Depth for i32 {
 }
 
 /// How large a part of the spacing of points a step of integers may be: then few windows are doubtful.
-const FINE: f32 = 8e-5;
+const FINE: f32 = 1.6e-4;
 
 /// The spacing is looked at in `SAMPLES - 1` rows and as many columns.
 const SAMPLES: usize = 8;

@@ -291,22 +291,26 @@ impl<T: Depth> Sums for HalfWindows<T> {
             let doubt = Floats::splat(self.doubt);
             let half = Floats::<S>(S::truncate(S::mul(sides, S::splat(0.5))));
             let points = half * half;
-            let exact = (doubt * (h2 + v2)).lt(n2 * T::reduction(points));
+            // Rounding moves the tangents along z, and so the normal by the other tangent's length across z.
+            let across_z = (hx * hx + hy * hy) + (vx * vx + vy * vy);
+            let exact = (doubt * across_z).lt(n2 * T::reduction(points));
             // Below this, squares of floats lose digits.
             let least = Floats::splat(f32::MIN_POSITIVE / f32::EPSILON);
+            let mut sure = exact & sine.max(least).lt(n2);
             // In windows of 3 both tangents join the same two points: floats decide the direction, as in PCL.
             let smallest = Floats::<S>(sides).lt(Floats::splat(4.0));
-            // And where they say that the tangents are parallel, there is no normal: n / |n| is NaN then.
-            let zero = Floats::splat(0.0);
-            let parallel = !(zero.lt(n[0].abs().max(n[1].abs()).max(n[2].abs())));
-            let is_long = least.lt(n2) & n2.lt(Floats::splat(f32::INFINITY));
-            let floats_decide = is_long | parallel & least.lt(h2) & least.lt(v2);
-            let floats_decide = smallest & floats_decide;
+            if smallest != 0 {
+                // And where they say that the tangents are parallel, there is no normal: n / |n| is NaN then.
+                let zero = Floats::splat(0.0);
+                let parallel = !(zero.lt(n[0].abs().max(n[1].abs()).max(n[2].abs())));
+                let is_long = least.lt(n2) & n2.lt(Floats::splat(f32::INFINITY));
+                sure |= smallest & (is_long | parallel & least.lt(h2) & least.lt(v2));
+            }
             let scale = Floats::splat(1.0) / n2.sqrt();
             Found {
                 normal: [n[0] * scale, n[1] * scale, n[2] * scale],
                 curvature: Floats::splat(f32::NAN),
-                doubtful: !(exact & sine.max(least).lt(n2) | floats_decide),
+                doubtful: !sure,
             }
         }
     }

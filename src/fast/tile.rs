@@ -509,50 +509,103 @@ impl<M: Sums> Row<'_, M> {
     /// As [`Tile::compute`].
     #[inline(always)]
     unsafe fn finish<S: Groups>(&self, run: &mut Run<M>) {
-        let &Row { tile, y, frame, sums, sink, .. } = self;
-        let planes = self.planes.rows(frame, y);
-        let row = tile.sides.row(y);
-        let viewpoint = tile.options.viewpoint;
+        let &Row { tile, y, sums, sink, .. } = self;
         let Run { sums: of_run, places, lanes, length } = run;
+        let (row, points) = (tile.sides.row(y), self.planes.rows(self.frame, y));
+        let (mut rest, mut any_rest) = ([0; RUN / LANES], 0);
         // SAFETY: as the caller's; the rows are readable up to a whole pair of groups.
         unsafe {
             of_run.solve::<S>(0, &lanes[..*length]);
             for number in 0..*length {
-                let (x, mut windows, written) = places[number];
-                let at = number * LANES;
+                let (x, windows, written) = places[number];
                 let sides = S::Pair::load(row.as_ptr().add(x));
-                let mut found = sums.estimate::<S::Pair>(of_run, at, sides, false);
-                let (mut doubtful, mut of_one) = (found.doubtful & lanes[number], 0);
-                let window = |lane: usize| ((x + lane, y), row[x + lane] as usize);
-                if doubtful != 0 {
-                    let around = |lane: usize| (window(lane).0, tile.around(window(lane)));
-                    of_one = of_one_point::<S::Widest>(tile.points, doubtful, around);
-                    (windows, doubtful) = (windows & !of_one, doubtful & !of_one);
-                }
-                if doubtful != 0 {
-                    let points = |lane: usize| tile.points_in(window(lane));
-                    let estimate = |run: &_| sums.estimate::<S::Pair>(run, at, sides, true);
-                    let precisely = |lane: usize| sums.precisely(tile, window(lane));
-                    doubtful =
-                        found.settle::<S, _, _>(doubtful, of_run, at, points, estimate, precisely);
-                }
-                let plain = windows & !lanes[number] | doubtful;
-                let column = frame.column(x);
-                let point = [
-                    Floats::load(planes[0].as_ptr().add(column)),
-                    Floats::load(planes[1].as_ptr().add(column)),
-                    Floats::load(planes[2].as_ptr().add(column)),
-                ];
-                let mut estimates = Estimates::of(found, point, viewpoint, windows & !plain);
-                let curvature = if M::CURVATURE { 0.0 } else { f32::NAN };
-                for lane in Bits(of_one) {
-                    estimates.put(lane, Estimate { curvature, ..Estimate::NONE });
-                }
-                if plain != 0 {
-                    tile.plain_lanes(&mut estimates, (x, y), plain);
-                }
-                tile.write::<S>(sink, (x, y), written, &estimates);
+                let found = sums.estimate::<S::Pair>(of_run, number * LANES, sides, false);
+                rest[number] = windows & !(lanes[number] & !found.doubtful);
+                any_rest |= rest[number];
+                let normals = self.turned::<S>(found, x, windows, points);
+                tile.write::<S>(sink, (x, y), written, &normals);
             }
+            if any_rest == 0 {
+                return;
+            }
+            for number in 0..*length {
+                if rest[number] != 0 {
+                    self.settle::<S>(of_run, number, places[number], lanes[number], rest[number]);
+                }
+            }
+        }
+    }
+
+    /// Writes the normals of a pair of a run, of these lanes, that are doubtful or left to the plain form: apart, as what
+    /// is held in registers for it would cost all others 2 to 4 %.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn settle<S: Groups>(
+        &self,
+        of_run: &mut M::OfRun,
+        number: usize,
+        (x, mut windows, _): (usize, u32, u32),
+        lanes: u32,
+        rest: u32,
+    ) {
+        let &Row { tile, y, sums, sink, .. } = self;
+        let row = tile.sides.row(y);
+        let window = |lane: usize| ((x + lane, y), row[x + lane] as usize);
+        let at = number * LANES;
+        // SAFETY: as the caller's.
+        unsafe {
+            let sides = S::Pair::load(row.as_ptr().add(x));
+            let mut found = sums.estimate::<S::Pair>(of_run, at, sides, false);
+            let (mut doubtful, mut of_one) = (found.doubtful & lanes, 0);
+            if doubtful != 0 {
+                let around = |lane: usize| (window(lane).0, tile.around(window(lane)));
+                of_one = of_one_point::<S::Widest>(tile.points, doubtful, around);
+                (windows, doubtful) = (windows & !of_one, doubtful & !of_one);
+            }
+            if doubtful != 0 {
+                let points = |lane: usize| tile.points_in(window(lane));
+                let estimate = |run: &_| sums.estimate::<S::Pair>(run, at, sides, true);
+                let precisely = |lane: usize| sums.precisely(tile, window(lane));
+                doubtful =
+                    found.settle::<S, _, _>(doubtful, of_run, at, points, estimate, precisely);
+            }
+            let plain = windows & !lanes | doubtful;
+            let points = self.planes.rows(self.frame, y);
+            let mut normals = self.turned::<S>(found, x, windows & !plain, points);
+            let curvature = if M::CURVATURE { 0.0 } else { f32::NAN };
+            for lane in Bits(of_one) {
+                normals.put(lane, Estimate { curvature, ..Estimate::NONE });
+            }
+            if plain != 0 {
+                tile.plain_lanes(&mut normals, (x, y), plain);
+            }
+            tile.write::<S>(sink, (x, y), rest, &normals);
+        }
+    }
+
+    /// What was found for these lanes of a pair, turned to the viewpoint; `points` are the row's.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn turned<S: Groups>(
+        &self,
+        found: Found<S::Pair>,
+        x: usize,
+        lanes: u32,
+        [xs, ys, zs]: [&[f32]; 3],
+    ) -> Estimates {
+        let column = self.frame.column(x);
+        // SAFETY: as the caller's; the rows are readable up to a whole pair of groups.
+        unsafe {
+            let point = [
+                Floats::load(xs.as_ptr().add(column)),
+                Floats::load(ys.as_ptr().add(column)),
+                Floats::load(zs.as_ptr().add(column)),
+            ];
+            Estimates::of(found, point, self.tile.options.viewpoint, lanes)
         }
     }
 }
