@@ -30,7 +30,7 @@ pub(crate) struct Tile<'a> {
     pub rows: Range<usize>,
     /// How far a window reaches from its pixel at most.
     pub largest: usize,
-    /// Columns and rows of the blocks whose middle pixels get the normals, at most `BLOCK`; the tile starts with one.
+    /// Columns and rows of the blocks whose middle pixels get the normals, 1 or `BLOCK`; the tile starts with one.
     pub step: usize,
     /// A row's depths, and the radii of its windows, if it has normals: 0 for none. Both can be read up to a whole group.
     pub row: &'a (dyn Fn(usize) -> (&'a [f32], &'a [f32]) + Sync),
@@ -182,7 +182,7 @@ impl Tile<'_> {
         for start in self.columns.clone().step_by(RUN * step) {
             run.start = start;
             (run.lanes, run.left_out) = ([0; RUN / LANES], [0; RUN / LANES]);
-            let own = [(start - self.columns.start) / step, (y - self.rows.start) / step];
+            let own = [self.block(start - self.columns.start), self.block(y - self.rows.start)];
             let is_later = PARTIAL && !layer.is_first;
             let asked =
                 if is_later { *waiting.run(own[0], own[1]) } else { [u32::MAX; RUN / LANES] };
@@ -190,11 +190,11 @@ impl Tile<'_> {
             let end = self.columns.end.min(start + RUN * step);
             for (group, x) in (start..end).step_by(GROUP * step).enumerate() {
                 let at = group * GROUP;
-                let count = (end - x).div_ceil(step).min(GROUP);
+                let count = self.blocks(end - x).min(GROUP);
                 let pixels = Pixels { x: x + step / 2, step, width };
                 // SAFETY: as the caller's; the rings hold what the windows of the tile's pixels need.
                 unsafe {
-                    let eight = S::load(radii[x / step..].as_ptr());
+                    let eight = S::load(radii[self.block(x)..].as_ptr());
                     let (pair, shift) = (at / LANES, at % LANES);
                     let out = left_out.map_or(0, |row| marks_from(row, x) as u32 & all(GROUP));
                     run.left_out[pair] |= out << shift;
@@ -247,48 +247,97 @@ impl Tile<'_> {
         is_later: bool,
     ) {
         let step = self.step;
-        let (width, height) = (self.points.width(), self.points.height());
-        let cleaned = Cleaned::new(self.points, self.options);
-        let Run { start, radii, sums, points, lanes, left_out } = run;
-        let end = self.columns.end.min(*start + RUN * step);
-        let columns = self.columns.start / step..self.columns.end.div_ceil(step);
+        let end = self.columns.end.min(run.start + RUN * step);
+        let columns = self.columns_of_blocks();
+        let (mut rest, mut any_rest) = ([0; RUN / LANES], 0);
         // SAFETY: as the caller's.
         unsafe {
-            sums.solve::<S>(0, lanes);
-            for (pair, x) in (*start..end).step_by(LANES * step).enumerate() {
-                let (at, mut windows) = (pair * LANES, lanes[pair]);
-                let count = (end - x).div_ceil(step).min(LANES);
-                let written = if is_later { windows } else { all(count) & !left_out[pair] };
-                let place = (x / step, y / step);
+            run.sums.solve::<S>(0, &run.lanes);
+            for (pair, x) in (run.start..end).step_by(LANES * step).enumerate() {
+                let (at, windows) = (pair * LANES, run.lanes[pair]);
+                let count = self.blocks(end - x).min(LANES);
+                let written = if is_later { windows } else { all(count) & !run.left_out[pair] };
+                let place = (self.block(x), self.block(y));
                 if windows == 0 {
                     sink.write::<S::Pair>(place, written, &Estimates::NONE, &columns);
                     continue;
                 }
-                let pixel =
-                    |lane: usize| (middle(x + lane * step, step, width), middle(y, step, height));
-                let rect =
-                    |lane: usize| window(pixel(lane), radii[at + lane] as usize, width, height);
-                let mut found = M::estimate::<S::Pair>(sums, at, error);
-                let mut plain = found.doubtful & windows;
-                if plain != 0 {
-                    let around = |lane: usize| (pixel(lane), rect(lane));
-                    let of_one = of_one_point::<S::Widest>(self.points, plain, around);
-                    (windows, plain) = (windows & !of_one, plain & !of_one);
-                }
-                if plain != 0 {
-                    let points = |lane: usize| cleaned.finite(rect(lane));
-                    let estimate = |run: &_| M::estimate::<S::Pair>(run, at, 0.0);
-                    plain = found.settle::<S, _, _>(plain, sums, at, points, estimate, |_| None);
-                }
-                let viewpoint = self.options.viewpoint;
-                let (sure, here) = (windows & !plain, points.load::<S::Pair>(at));
-                let mut normals = Estimates::of(found, here, viewpoint, sure);
-                for lane in Bits(plain) {
-                    normals.put(lane, self.plain(&cleaned, pixel(lane), &rect(lane)));
-                }
+                let found = M::estimate::<S::Pair>(&run.sums, at, error);
+                rest[pair] = found.doubtful & windows;
+                any_rest |= rest[pair];
+                let here = run.points.load::<S::Pair>(at);
+                let normals = Estimates::of(found, here, self.options.viewpoint, windows);
                 sink.write::<S::Pair>(place, written, &normals, &columns);
             }
+            if any_rest == 0 {
+                return;
+            }
+            for pair in 0..RUN / LANES {
+                if rest[pair] != 0 {
+                    self.settle::<S, M, N>(sink, run, y, pair, rest[pair], error);
+                }
+            }
         }
+    }
+
+    /// Writes those normals of a pair of a run, of these lanes, that are doubtful: apart, as in PCL's semantics.
+    ///
+    /// # Safety
+    /// As [`Tile::compute`].
+    #[inline(always)]
+    unsafe fn settle<S: Groups, M: Sums<N>, const N: usize>(
+        &self,
+        sink: &Sink,
+        run: &mut Run<M::OfRun>,
+        y: usize,
+        pair: usize,
+        doubtful: u32,
+        error: f64,
+    ) {
+        let (step, at) = (self.step, pair * LANES);
+        let (width, height) = (self.points.width(), self.points.height());
+        let cleaned = Cleaned::new(self.points, self.options);
+        let Run { start, radii, sums, points, .. } = run;
+        let x = *start + at * step;
+        let pixel = |lane: usize| (middle(x + lane * step, step, width), middle(y, step, height));
+        let rect = |lane: usize| window(pixel(lane), radii[at + lane] as usize, width, height);
+        // SAFETY: as the caller's.
+        unsafe {
+            let around = |lane: usize| (pixel(lane), rect(lane));
+            let windows = doubtful & !of_one_point::<S::Widest>(self.points, doubtful, around);
+            let mut found = M::estimate::<S::Pair>(sums, at, error);
+            let mut plain = windows;
+            if plain != 0 {
+                let points = |lane: usize| cleaned.finite(rect(lane));
+                let estimate = |run: &_| M::estimate::<S::Pair>(run, at, 0.0);
+                plain = found.settle::<S, _, _>(plain, sums, at, points, estimate, |_| None);
+            }
+            let here = points.load::<S::Pair>(at);
+            let mut normals = Estimates::of(found, here, self.options.viewpoint, windows & !plain);
+            for lane in Bits(plain) {
+                normals.put(lane, self.plain(&cleaned, pixel(lane), &rect(lane)));
+            }
+            let (place, columns) = ((self.block(x), self.block(y)), self.columns_of_blocks());
+            sink.write::<S::Pair>(place, doubtful, &normals, &columns);
+        }
+    }
+
+    /// How many blocks so many pixels in a row or a column are in.
+    #[inline(always)]
+    fn blocks(&self, pixels: usize) -> usize {
+        self.block(pixels + self.step - 1)
+    }
+
+    /// Which block a column or a row is in: by a shift, as a division is half of what is left of a loop.
+    #[inline(always)]
+    fn block(&self, at: usize) -> usize {
+        at >> self.step.trailing_zeros()
+    }
+
+    /// The columns of the tile, in blocks.
+    #[inline(always)]
+    fn columns_of_blocks(&self) -> Range<usize> {
+        self.block(self.columns.start)..self.blocks(self.columns.end)
     }
 
     /// The plain form of one pixel.
