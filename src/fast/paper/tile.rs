@@ -328,7 +328,7 @@ impl Tile<'_> {
         self.block(pixels + self.step - 1)
     }
 
-    /// Which block a column or a row is in: by a shift, as a division is half of what is left of a loop.
+    /// Which block a column or a row is in: by a shift, as steps are powers of two and divisions slow.
     #[inline(always)]
     fn block(&self, at: usize) -> usize {
         at >> self.step.trailing_zeros()
