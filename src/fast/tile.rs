@@ -510,17 +510,16 @@ impl<M: Sums> Row<'_, M> {
     #[inline(always)]
     unsafe fn finish<S: Groups>(&self, run: &mut Run<M>) {
         let &Row { tile, y, sums, sink, .. } = self;
-        let Run { sums: of_run, places, lanes, length } = run;
         let (row, points) = (tile.sides.row(y), self.planes.rows(self.frame, y));
         let (mut rest, mut any_rest) = ([0; RUN / LANES], 0);
         // SAFETY: as the caller's; the rows are readable up to a whole pair of groups.
         unsafe {
-            of_run.solve::<S>(0, &lanes[..*length]);
-            for number in 0..*length {
-                let (x, windows, written) = places[number];
+            run.sums.solve::<S>(0, &run.lanes[..run.length]);
+            for number in 0..run.length {
+                let (x, windows, written) = run.places[number];
                 let sides = S::Pair::load(row.as_ptr().add(x));
-                let found = sums.estimate::<S::Pair>(of_run, number * LANES, sides, false);
-                rest[number] = windows & !(lanes[number] & !found.doubtful);
+                let found = sums.estimate::<S::Pair>(&run.sums, number * LANES, sides, false);
+                rest[number] = windows & !(run.lanes[number] & !found.doubtful);
                 any_rest |= rest[number];
                 let normals = self.turned::<S>(found, x, windows, points);
                 tile.write::<S>(sink, (x, y), written, &normals);
@@ -528,41 +527,35 @@ impl<M: Sums> Row<'_, M> {
             if any_rest == 0 {
                 return;
             }
-            for number in 0..*length {
+            for number in 0..run.length {
                 if rest[number] != 0 {
-                    self.settle::<S>(of_run, number, places[number], lanes[number], rest[number]);
+                    self.settle::<S>(run, number, rest[number]);
                 }
             }
         }
     }
 
-    /// Writes the normals of a pair of a run, of these lanes, that are doubtful or left to the plain form: apart, as what
-    /// is held in registers for it would cost all others 2 to 4 %.
+    /// Writes the normals of a pair of a run, of the lanes `rest`, that are doubtful or left to the plain form: apart, as
+    /// what is held in registers for it would cost all others 1 to 5 %.
     ///
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn settle<S: Groups>(
-        &self,
-        of_run: &mut M::OfRun,
-        number: usize,
-        (x, mut windows, _): (usize, u32, u32),
-        lanes: u32,
-        rest: u32,
-    ) {
+    unsafe fn settle<S: Groups>(&self, run: &mut Run<M>, number: usize, rest: u32) {
         let &Row { tile, y, sums, sink, .. } = self;
+        let Run { sums: of_run, places, lanes, .. } = run;
+        let ((x, ..), lanes, at) = (places[number], lanes[number], number * LANES);
         let row = tile.sides.row(y);
         let window = |lane: usize| ((x + lane, y), row[x + lane] as usize);
-        let at = number * LANES;
         // SAFETY: as the caller's.
         unsafe {
             let sides = S::Pair::load(row.as_ptr().add(x));
             let mut found = sums.estimate::<S::Pair>(of_run, at, sides, false);
-            let (mut doubtful, mut of_one) = (found.doubtful & lanes, 0);
+            let (mut doubtful, mut of_one) = (rest & lanes, 0);
             if doubtful != 0 {
                 let around = |lane: usize| (window(lane).0, tile.around(window(lane)));
                 of_one = of_one_point::<S::Widest>(tile.points, doubtful, around);
-                (windows, doubtful) = (windows & !of_one, doubtful & !of_one);
+                doubtful &= !of_one;
             }
             if doubtful != 0 {
                 let points = |lane: usize| tile.points_in(window(lane));
@@ -571,9 +564,9 @@ impl<M: Sums> Row<'_, M> {
                 doubtful =
                     found.settle::<S, _, _>(doubtful, of_run, at, points, estimate, precisely);
             }
-            let plain = windows & !lanes | doubtful;
+            let plain = rest & !lanes | doubtful;
             let points = self.planes.rows(self.frame, y);
-            let mut normals = self.turned::<S>(found, x, windows & !plain, points);
+            let mut normals = self.turned::<S>(found, x, rest & !of_one & !plain, points);
             let curvature = if M::CURVATURE { 0.0 } else { f32::NAN };
             for lane in Bits(of_one) {
                 normals.put(lane, Estimate { curvature, ..Estimate::NONE });

@@ -93,8 +93,7 @@ impl Tile<'_> {
     #[inline(always)]
     pub fn start_waiting(&self, layer: &Layer, waiting: &mut Waiting) {
         if layer.is_first {
-            let [columns, rows] =
-                [&self.columns, &self.rows].map(|all| all.len().div_ceil(self.step));
+            let [columns, rows] = [&self.columns, &self.rows].map(|all| self.blocks(all.len()));
             waiting.start(columns, rows);
         }
     }
