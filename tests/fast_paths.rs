@@ -29,9 +29,6 @@ fn allowed(options: &Options) -> f64 {
     }
 }
 
-/// Cosine between a normal and its line of sight from which on the side is certain. At the viewpoint it never is.
-const EDGE_ON: f64 = 1e-5;
-
 impl Worst {
     fn check(&mut self, cloud: &Cloud, what: &str, options: &iine::Options) {
         let plain = compute(&mut Estimator::with_isa(options.clone(), Isa::Scalar), cloud);
@@ -63,7 +60,8 @@ impl Worst {
                 });
                 let length = sight.iter().map(|c| c * c).sum::<f64>().sqrt();
                 let cosine = a.iter().zip(sight).map(|(n, s)| n * s).sum::<f64>() / length;
-                if cosine.is_nan() || cosine.abs() < EDGE_ON {
+                // What it may differ by can turn it to the other side; at the viewpoint it has none.
+                if cosine.is_nan() || cosine.abs() < allowed(options).to_radians() {
                     degrees = degrees.min(180.0 - degrees);
                 }
                 let worst = &mut self.angle[options.method as usize];
@@ -298,6 +296,34 @@ fn depths_orders_of_magnitude_apart_equal_the_plain_form() {
             let listed = compute_listed(&mut estimator, cloud, &indices);
             let expected: Vec<_> = indices.iter().map(|index| all[*index as usize]).collect();
             assert_same_bits(&expected, &listed, listed.len(), &format!("indices, {what}"));
+        }
+    }
+    println!("{worst:?}");
+}
+
+/// So far away that a point twenty times as far is no depth change: sums about that one would lose what its window's others
+/// are to each other.
+#[test]
+fn windows_with_one_far_point_equal_the_plain_form() {
+    let mut worst = Worst::default();
+    let (width, height) = (80, 60);
+    let is_cm = |options: &Options| options.method == Method::CovarianceMatrix;
+    let all_options: Vec<_> = paper_options().into_iter().filter(is_cm).collect();
+    for seed in 0..6 {
+        let mut random = Random::new(seed);
+        let focal = random.between(1e4, 1e5);
+        let mut points = Vec::new();
+        for at in 0..width * height {
+            let [u, v] = [at % width, at / width].map(|at| at as f32 / focal);
+            let mut z = 2000.0 * (1.0 + u + random.between(0.0, 1e-7));
+            if random.below(1000) == 0 {
+                z *= 20.0;
+            }
+            points.push([(u - 0.6) * z, (v + 0.8) * z, z]);
+        }
+        let cloud = Cloud { width, height, points };
+        for options in &all_options {
+            worst.check(&cloud, &format!("seed {seed}"), options);
         }
     }
     println!("{worst:?}");

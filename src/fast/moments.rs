@@ -74,20 +74,30 @@ pub(crate) struct WindowMoments<S: Simd> {
     pub share: Doubles<S>,
 }
 
-/// The sums of points' moments about the first of them, and the number of points.
+/// The sums of points' moments about the first of them, or about their mean if that one is far from the others; and the
+/// number of points. Together the squares are at most four times as large as the trace of the scatter matrix.
 #[cold]
-fn sum_of_moments(points: impl Iterator<Item = [f64; 3]>) -> ([f64; CHANNELS], f64) {
-    let (mut sums, mut count) = ([0.0; CHANNELS], 0.0);
-    let mut origin = None;
-    points.for_each(|point| {
-        let origin = origin.get_or_insert(point);
-        let [x, y, z] = difference(point, *origin);
-        let of_point = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
-        for (sum, value) in sums.iter_mut().zip(of_point) {
-            *sum += value;
-        }
-        count += 1.0;
-    });
+fn sum_of_moments<P: Iterator<Item = [f64; 3]>>(points: impl Fn() -> P) -> ([f64; CHANNELS], f64) {
+    let about = |origin: [f64; 3]| {
+        let (mut sums, mut count) = ([0.0; CHANNELS], 0.0);
+        points().for_each(|point| {
+            let [x, y, z] = difference(point, origin);
+            let of_point = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
+            for (sum, value) in sums.iter_mut().zip(of_point) {
+                *sum += value;
+            }
+            count += 1.0;
+        });
+        (sums, count)
+    };
+    let first = points().next().unwrap_or_default();
+    let (sums, count) = about(first);
+    let [x, y, z, xx, _, _, yy, _, zz] = sums;
+    let of_mean = dot([x, y, z], [x, y, z]) / count;
+    if of_mean > 0.75 * (xx + yy + zz) {
+        let mean = [first[0] + x / count, first[1] + y / count, first[2] + z / count];
+        return about(mean);
+    }
     (sums, count)
 }
 
@@ -105,7 +115,7 @@ const CONVERGED: f32 = 1e-3;
 const DOUBT_SUMS: f64 = 3e4;
 
 /// In doubles, the least distance between the two smaller eigenvalues (of a matrix of trace 1), so that rounding turns a
-/// normal by less than 1e-5. A window's sums about one of its points are up to four times as large as the trace.
+/// normal by less than 1e-5. A window's sums afresh are up to four times as large as the trace.
 const LEAST_GAP: f64 = 1e5 * 4.0 * ROUNDING;
 
 /// The least product of the smallest eigenvalue's distances from the others (of a matrix of trace 1): the rounding of
@@ -447,7 +457,7 @@ impl Noted for Matrices {
     ) -> bool {
         let (mut sums, mut shares) = ([[0.0; LANES]; CHANNELS], [0.0; LANES]);
         for lane in Bits(lanes) {
-            let (moments, count) = sum_of_moments(points(lane));
+            let (moments, count) = sum_of_moments(|| points(lane));
             for c in 0..CHANNELS {
                 sums[c][lane] = moments[c];
             }
@@ -467,7 +477,7 @@ impl Noted for Matrices {
         true
     }
 
-    /// In doubles, from moments about one of the window's points; none if rounding leaves it doubtful.
+    /// In doubles, from moments afresh; none if rounding leaves it doubtful.
     #[cold]
     fn precisely(&self, at: usize) -> Option<Estimate> {
         let [xx, xy, xz, yy, yz, zz] = self.elements.of_one(at);
