@@ -15,7 +15,7 @@ use crate::fast::sink::Sink;
 use crate::fast::tile::{Bits, all};
 use crate::paper::{
     Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, MIDDLE, Plane,
-    even_window, middle,
+    ROUNDING, even_window, middle,
 };
 use crate::simd::{GROUP, Groups};
 use crate::vector::dot;
@@ -363,7 +363,8 @@ impl EvenTile<'_> {
             let across = times([axx, axy, axz, ayy, ayz, azz], m);
             let along = times([xx, xy, xz, yy, yz, zz], m);
             let (spread, length2, along) = (dot(m, across), dot(m, m), dot(m, along));
-            let half_trace = ((xx + yy + zz) * length2 - along) * Doubles::splat(0.5);
+            let trace = xx + yy + zz;
+            let half_trace = (trace * length2 - along) * Doubles::splat(0.5);
             let (seen, line) =
                 (spread * length2, Doubles::splat(Plane::LINE) * half_trace * half_trace);
             let enough = Doubles::splat(Plane::FEWEST - 0.5).lt(n);
@@ -384,7 +385,10 @@ impl EvenTile<'_> {
             let mut unevenness = deviation2 / depth2;
             // What the errors do to the sum of (1 - q P)^2, and to what tells lines and depths.
             let least = Doubles::splat(self.even.asked.least_noise.into());
-            let (of_deviation, scale) = (Doubles::splat(2.0 * error) * q2, below * depth2);
+            // The determinant loses where points are far apart along a line.
+            let of_determinant = Doubles::splat(ROUNDING) * trace * trace * trace * scale * n;
+            let of_deviation = Doubles::splat(2.0 * error) * q2 + of_determinant;
+            let scale = below * depth2;
             let allowed = Doubles::splat(DOUBT) * least.max(unevenness) * scale;
             // Far below what is told from none, it makes no difference.
             let largest = unevenness * scale + of_deviation;
