@@ -29,6 +29,9 @@ fn allowed(options: &Options) -> f64 {
     }
 }
 
+/// Cosine between a normal and its line of sight from which on the side is certain. At the viewpoint it never is.
+const EDGE_ON: f64 = 1e-5;
+
 impl Worst {
     fn check(&mut self, cloud: &Cloud, what: &str, options: &iine::Options) {
         let plain = compute(&mut Estimator::with_isa(options.clone(), Isa::Scalar), cloud);
@@ -60,8 +63,7 @@ impl Worst {
                 });
                 let length = sight.iter().map(|c| c * c).sum::<f64>().sqrt();
                 let cosine = a.iter().zip(sight).map(|(n, s)| n * s).sum::<f64>() / length;
-                // What it may differ by can turn it to the other side; at the viewpoint it has none.
-                if cosine.is_nan() || cosine.abs() < allowed(options).to_radians() {
+                if cosine.is_nan() || cosine.abs() < EDGE_ON {
                     degrees = degrees.min(180.0 - degrees);
                 }
                 let worst = &mut self.angle[options.method as usize];

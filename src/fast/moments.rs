@@ -8,12 +8,12 @@ use super::planes::{Frame, MARGIN, Planes};
 use super::run::{Noted, OfRun, RUN};
 use super::tile::{Bits, Found, Pair, Sums, Tile, all};
 use crate::Error;
-use crate::eigen::{Symmetric3, eigen};
+use crate::eigen::{Scatter, Symmetric3, eigen};
 use crate::memory::{bytes, make_room};
 use crate::methods::Estimate;
 use crate::paper::ROUNDING;
 use crate::simd::{GROUP, Groups, Simd};
-use crate::vector::{difference, dot};
+use crate::vector::dot;
 use crate::window::Image;
 
 /// x, y, z, xx, xy, xz, yy, yz, zz
@@ -74,33 +74,6 @@ pub(crate) struct WindowMoments<S: Simd> {
     pub share: Doubles<S>,
 }
 
-/// The sums of points' moments about the first of them, or about their mean if that one is far from the others; and the
-/// number of points. Together the squares are at most four times as large as the trace of the scatter matrix.
-#[cold]
-fn sum_of_moments<P: Iterator<Item = [f64; 3]>>(points: impl Fn() -> P) -> ([f64; CHANNELS], f64) {
-    let about = |origin: [f64; 3]| {
-        let (mut sums, mut count) = ([0.0; CHANNELS], 0.0);
-        points().for_each(|point| {
-            let [x, y, z] = difference(point, origin);
-            let of_point = [x, y, z, x * x, x * y, x * z, y * y, y * z, z * z];
-            for (sum, value) in sums.iter_mut().zip(of_point) {
-                *sum += value;
-            }
-            count += 1.0;
-        });
-        (sums, count)
-    };
-    let first = points().next().unwrap_or_default();
-    let (sums, count) = about(first);
-    let [x, y, z, xx, _, _, yy, _, zz] = sums;
-    let of_mean = dot([x, y, z], [x, y, z]) / count;
-    if of_mean > 0.75 * (xx + yy + zz) {
-        let mean = [first[0] + x / count, first[1] + y / count, first[2] + z / count];
-        return about(mean);
-    }
-    (sums, count)
-}
-
 /// Newton steps for the eigenvalue: one is usual, a few more where two eigenvalues are near.
 const STEPS: usize = 8;
 
@@ -115,7 +88,7 @@ const CONVERGED: f32 = 1e-3;
 const DOUBT_SUMS: f64 = 3e4;
 
 /// In doubles, the least distance between the two smaller eigenvalues (of a matrix of trace 1), so that rounding turns a
-/// normal by less than 1e-5. A window's sums afresh are up to four times as large as the trace.
+/// normal by less than 1e-5: in sums over hundreds of points it is about four times [`ROUNDING`].
 const LEAST_GAP: f64 = 1e5 * 4.0 * ROUNDING;
 
 /// The least product of the smallest eigenvalue's distances from the others (of a matrix of trace 1): the rounding of
@@ -455,29 +428,32 @@ impl Noted for Matrices {
         lanes: u32,
         points: impl Fn(usize) -> P,
     ) -> bool {
-        let (mut sums, mut shares) = ([[0.0; LANES]; CHANNELS], [0.0; LANES]);
+        let (mut matrices, mut shares) = ([[0.0; LANES]; 6], [0.0; LANES]);
         for lane in Bits(lanes) {
-            let (moments, count) = sum_of_moments(|| points(lane));
-            for c in 0..CHANNELS {
-                sums[c][lane] = moments[c];
+            if let Some(Scatter { matrix, count, .. }) = Scatter::of(|| points(lane)) {
+                let Symmetric3 { xx, xy, xz, yy, yz, zz } = matrix;
+                for (to, value) in matrices.iter_mut().zip([xx, xy, xz, yy, yz, zz]) {
+                    to[lane] = value;
+                }
+                shares[lane] = 1.0 / count;
             }
-            shares[lane] = 1.0 / count;
         }
         for group in (0..LANES).step_by(GROUP) {
             // SAFETY: as the caller's; the arrays hold whole groups.
             unsafe {
-                let share = Doubles(S::load_d(shares.as_ptr().add(group)));
-                let mut of8 = [share; CHANNELS];
-                for c in 0..CHANNELS {
-                    of8[c] = Doubles(S::load_d(sums[c].as_ptr().add(group)));
+                let load = |from: &[f64; LANES]| Doubles(S::load_d(from.as_ptr().add(group)));
+                // About the mean, to which the points' ways add up to nothing.
+                let mut sums = [Doubles::splat(0.0); CHANNELS];
+                for (to, from) in sums[3..].iter_mut().zip(&matrices) {
+                    *to = load(from);
                 }
-                self.note::<S>(&WindowMoments { sums: of8, share }, at + group);
+                self.note::<S>(&WindowMoments { sums, share: load(&shares) }, at + group);
             }
         }
         true
     }
 
-    /// In doubles, from moments afresh; none if rounding leaves it doubtful.
+    /// In doubles, from the matrix afresh; none if rounding leaves it doubtful.
     #[cold]
     fn precisely(&self, at: usize) -> Option<Estimate> {
         let [xx, xy, xz, yy, yz, zz] = self.elements.of_one(at);
