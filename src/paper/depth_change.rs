@@ -11,9 +11,9 @@
 use std::iter::repeat_n;
 use std::ops::Range;
 
-use super::blocks::Blocks;
+use super::blocks::{BLOCK, Blocks};
 use super::cloud::Cloud;
-use super::marks::{Marks, WORD, around, columns, mark};
+use super::marks::{Marks, WORD, around, bits, columns, mark};
 use super::planes::{JITTER, Plane, inverse_depth};
 use crate::Error;
 use crate::memory::{bytes, refill, table};
@@ -35,7 +35,7 @@ pub(crate) struct DepthChanges {
     below: Marks,
     /// The pixels that have a change among those next to them.
     spoilt: Marks,
-    /// Every pixel's steps along its column to the next one of these, with room beside the rows.
+    /// In the blocks' middle rows, every pixel's steps along its column to the next one of these, with room beside the rows.
     steps: Vec<i16>,
     clean_radii: Vec<i16>,
 }
@@ -142,8 +142,7 @@ impl DepthChanges {
         for (axis, changes) in [&mut self.right, &mut self.below].into_iter().enumerate() {
             workers.each(changes.rows().enumerate(), |(y, row)| {
                 for (word, first) in row.iter_mut().zip((y * width..).step_by(WORD)) {
-                    let marks = [*word];
-                    let explained = columns(&marks).filter(|x| is_explained(axis, first + x));
+                    let explained = bits(*word).filter(|x| is_explained(axis, first + x));
                     *word &= !explained.fold(0, |all, x| all | 1 << x);
                 }
             });
@@ -159,14 +158,8 @@ impl DepthChanges {
     ) -> Result<Clean<'_>, Error> {
         let DepthChanges { right, below, spoilt, steps, clean_radii } = self;
         spoilt.clear((width, height))?;
-        // The chessboard distance: along the columns to all pixels, then along the rows to the blocks' middles.
-        let reach = (limit as usize).min(width.max(height)).min(LARGEST_CLEAN as usize);
-        let beside = reach.min(width);
-        let stride = beside + width + beside + NUMBERS;
-        refill(steps, repeat_n(LARGEST_CLEAN, height * stride))?;
         // Both pixels of a change, and those next to them along it.
-        let rows = spoilt.rows().zip(steps.chunks_mut(stride)).enumerate();
-        workers.each(rows, |(y, (spoilt, steps))| {
+        workers.each(spoilt.rows().enumerate(), |(y, spoilt)| {
             for y in y.saturating_sub(1)..(y + 2).min(height) {
                 for (word, spoilt) in spoilt.iter_mut().enumerate() {
                     let [own, next, _] = around(right.row(y), word);
@@ -179,23 +172,33 @@ impl DepthChanges {
                     *spoilt |= own | next | previous;
                 }
             }
-            // Marks may go on behind the last column.
-            columns(spoilt).take_while(|x| *x < width).for_each(|x| steps[beside + x] = 0);
         });
-        for y in 1..height {
-            let (above, row) = steps.split_at_mut(y * stride);
-            step_from(&mut row[..stride], &above[(y - 1) * stride..]);
-        }
-        for y in (1..height).rev() {
-            let (above, row) = steps.split_at_mut(y * stride);
-            step_from(&mut above[(y - 1) * stride..], &row[..stride]);
-        }
+        // The chessboard distance to the blocks' middles: along the columns to all pixels in their rows, then along these.
         let blocks = Blocks::of(width, height);
+        let middle = |row: usize| blocks.middle_of((0, row)).1;
+        let reach = (limit as usize).min(width.max(height)).min(LARGEST_CLEAN as usize);
+        let beside = reach.min(width);
+        let stride = beside + width + beside + NUMBERS;
+        refill(steps, repeat_n(LARGEST_CLEAN, blocks.down * stride))?;
+        let spoilt = &*spoilt;
+        workers.each(steps.chunks_mut(stride).enumerate(), |(row, steps)| {
+            find_steps(spoilt, (width, height), middle(row), &mut steps[beside..]);
+        });
+        for row in 1..blocks.down {
+            let (above, below) = steps.split_at_mut(row * stride);
+            step_from(below, &above[(row - 1) * stride..], middle(row) - middle(row - 1));
+        }
+        for row in (1..blocks.down).rev() {
+            let (above, below) = steps.split_at_mut(row * stride);
+            let above = &mut above[(row - 1) * stride..];
+            step_from(above, below, middle(row) - middle(row - 1));
+        }
         refill(clean_radii, repeat_n(0, blocks.count()))?;
-        workers.each(clean_radii.chunks_mut(blocks.across).enumerate(), |(row, radii)| {
+        let rows = clean_radii.chunks_mut(blocks.across).zip(steps.chunks(stride)).enumerate();
+        workers.each(rows, |(row, (radii, steps))| {
             for (column, radius) in radii.iter_mut().enumerate() {
-                let (x, y) = blocks.middle(row * blocks.across + column);
-                let steps = least_steps_along(&steps[y * stride + x..], beside);
+                let (x, _) = blocks.middle_of((column, row));
+                let steps = least_steps_along(&steps[x..], beside);
                 *radius = if steps < reach as i16 { steps } else { LARGEST_CLEAN };
             }
         });
@@ -203,19 +206,37 @@ impl DepthChanges {
     }
 }
 
-/// The steps from a row to the next one.
-fn step_from(row: &mut [i16], next: &[i16]) {
+/// Finds the steps from row `y` to the marks nearby: of as many rows as can be nearer to it than to another middle.
+fn find_steps(marks: &Marks, (width, height): (usize, usize), y: usize, steps: &mut [i16]) {
+    for (word, first) in (0..width.div_ceil(WORD)).zip((0..).step_by(WORD)) {
+        let mut found = 0;
+        for away in 0..BLOCK {
+            let rows = [y.checked_sub(away), Some(y + away).filter(|y| *y < height)];
+            let near = rows.into_iter().flatten().fold(0, |all, y| all | marks.row(y)[word]);
+            // Marks may go on behind the last column.
+            let new = bits(near & !found).map(|x| first + x).take_while(|x| *x < width);
+            new.for_each(|x| steps[x] = away as i16);
+            found |= near;
+        }
+    }
+}
+
+/// Takes the steps to a row which is so far away and those from there on, where these are fewer.
+fn step_from(row: &mut [i16], next: &[i16], away: usize) {
     for (to, from) in row.iter_mut().zip(next) {
-        *to = (*to).min(from + 1);
+        *to = (*to).min(from + away as i16);
     }
 }
 
 /// The chessboard distance of the pixel that is `beside` behind the first, by the steps along the columns of those up to so
 /// far around it; more than any window's radius if there is none.
 fn least_steps_along(steps: &[i16], beside: usize) -> i16 {
-    let mut along = std::array::from_fn::<_, NUMBERS, _>(|i| i as i16 - beside as i16);
+    // What is farther away along the row than along the own column does not matter.
+    let reach = beside.min(steps[beside] as usize);
+    let mut along = std::array::from_fn::<_, NUMBERS, _>(|i| i as i16 - reach as i16);
     let mut least = [LARGEST_CLEAN; NUMBERS];
-    for steps in steps.chunks_exact(NUMBERS).take((2 * beside + 1).div_ceil(NUMBERS)) {
+    let steps = steps[beside - reach..].chunks_exact(NUMBERS);
+    for steps in steps.take((2 * reach + 1).div_ceil(NUMBERS)) {
         for i in 0..NUMBERS {
             least[i] = least[i].min(steps[i].max(along[i].abs()));
             along[i] += NUMBERS as i16;

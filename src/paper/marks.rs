@@ -82,13 +82,16 @@ pub(crate) fn word_of(marks: impl Iterator<Item = bool>) -> u64 {
 
 /// The columns that are marked in a row.
 pub(crate) fn columns(row: &[u64]) -> impl Iterator<Item = usize> {
-    row.iter().zip((0..).step_by(WORD)).flat_map(|(word, first)| {
-        let mut left = *word;
-        std::iter::from_fn(move || {
-            let lowest = left.trailing_zeros() as usize;
-            left &= left.wrapping_sub(1);
-            (lowest < WORD).then_some(first + lowest)
-        })
+    let words = row.iter().zip((0..).step_by(WORD));
+    words.flat_map(|(word, first)| bits(*word).map(move |x| first + x))
+}
+
+/// The bits that are set in a word.
+pub(crate) fn bits(mut word: u64) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lowest = word.trailing_zeros() as usize;
+        word &= word.wrapping_sub(1);
+        (lowest < WORD).then_some(lowest)
     })
 }
 
