@@ -3,8 +3,9 @@
 use std::ffi::CStr;
 use std::sync::OnceLock;
 
-/// An instruction set that normals can be computed with. All give the same bits but [`Isa::Scalar`], the plain code
-/// that specifies the results and is slow.
+/// An instruction set that normals can be computed with. Those that fuse a product with a sum ([`Isa::Avx2`],
+/// [`Isa::Avx512`], [`Isa::Neon`]) give the same bits, and so do those that cannot ([`Isa::Portable`], [`Isa::Sse2`]).
+/// [`Isa::Scalar`] is the plain code that specifies the results, and slow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[non_exhaustive]
 pub enum Isa {
@@ -14,9 +15,9 @@ pub enum Isa {
     Portable,
     /// SSE2, on every x86-64.
     Sse2,
-    /// AVX2.
+    /// AVX2 and FMA.
     Avx2,
-    /// AVX-512 (F, VL, DQ, BW).
+    /// AVX-512 (F, VL, DQ, BW), and FMA.
     Avx512,
     /// NEON, on every 64-bit Arm.
     Neon,
@@ -50,10 +51,11 @@ impl Isa {
             #[cfg(target_arch = "x86_64")]
             Isa::Sse2 => true,
             #[cfg(target_arch = "x86_64")]
-            Isa::Avx2 => is_x86_feature_detected!("avx2"),
+            Isa::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             #[cfg(target_arch = "x86_64")]
             Isa::Avx512 => {
-                is_x86_feature_detected!("avx512f")
+                is_x86_feature_detected!("fma")
+                    && is_x86_feature_detected!("avx512f")
                     && is_x86_feature_detected!("avx512vl")
                     && is_x86_feature_detected!("avx512dq")
                     && is_x86_feature_detected!("avx512bw")

@@ -41,6 +41,31 @@ operators!(Floats, Add, add, add; Sub, sub, sub; Mul, mul, mul; Div, div, div;);
 operators!(Doubles, Add, add, add_d; Sub, sub, sub_d; Mul, mul, mul_d; Div, div, div_d;);
 operators!(Integers, Add, add, add_i; Sub, sub, sub_i;);
 
+macro_rules! products {
+    ($($type:ident, $mul_add:ident, $neg_mul_add:ident;)*) => {
+        $(impl<S: Simd> $type<S> {
+            /// `self + a * b`, rounded once where the instruction set can.
+            #[inline(always)]
+            pub fn plus(self, a: Self, b: Self) -> Self {
+                // SAFETY: there is a group, so there is the instruction set.
+                $type(unsafe { S::$mul_add(a.0, b.0, self.0) })
+            }
+
+            /// `self - a * b`, likewise.
+            #[inline(always)]
+            pub fn minus(self, a: Self, b: Self) -> Self {
+                // SAFETY: there is a group, so there is the instruction set.
+                $type(unsafe { S::$neg_mul_add(a.0, b.0, self.0) })
+            }
+        })*
+    };
+}
+
+products! {
+    Floats, mul_add, neg_mul_add;
+    Doubles, mul_add_d, neg_mul_add_d;
+}
+
 /// What lies between a window's corners, above and below, each left and right, where integral rows hold what `at` says.
 #[inline(always)]
 pub(crate) fn between<C, T: Sub<Output = T>>(corners: [[C; 2]; 2], at: impl Fn(C) -> T) -> T {

@@ -13,7 +13,6 @@ use crate::memory::{bytes, make_room};
 use crate::methods::Estimate;
 use crate::paper::ROUNDING;
 use crate::simd::{GROUP, Groups, Simd};
-use crate::vector::dot;
 use crate::window::Image;
 
 /// x, y, z, xx, xy, xz, yy, yz, zz
@@ -492,18 +491,18 @@ impl Matrices {
         unsafe {
             let [x, y, z, xx, xy, xz, yy, yz, zz] = moments.sums;
             let (mx, my, mz) = (x * moments.share, y * moments.share, z * moments.share);
-            let (xx, xy, xz) = (xx - x * mx, xy - x * my, xz - x * mz);
-            let (yy, yz, zz) = (yy - y * my, yz - y * mz, zz - z * mz);
+            let (xx, xy, xz) = (xx.minus(x, mx), xy.minus(x, my), xz.minus(x, mz));
+            let (yy, yz, zz) = (yy.minus(y, my), yz.minus(y, mz), zz.minus(z, mz));
             // A trace next to 1: floats divide in a quarter of the time.
             let trace = (xx + yy + zz).narrow();
             let scale = (Floats::splat(1.0) / trace).widen();
             let (xx, xy, xz) = (xx * scale, xy * scale, xz * scale);
             let (yy, yz, zz) = (yy * scale, yz * scale, zz * scale);
-            let (minor_x, minor_y, minor_z) =
-                (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
+            let minors = [minor(yy, zz, yz, yz), minor(xx, zz, xz, xz), minor(xx, yy, xy, xy)];
             let c2 = xx + yy + zz;
-            let c1 = minor_x + minor_y + minor_z;
-            let c0 = xx * minor_x + xy * (xz * yz - xy * zz) + xz * (xy * yz - xz * yy);
+            let c1 = minors[0] + minors[1] + minors[2];
+            let others = [minor(xz, yz, xy, zz), minor(xy, yz, xz, yy)];
+            let c0 = (xx * minors[0]).plus(xy, others[0]).plus(xz, others[1]);
             self.elements.store::<S>(at, [xx, xy, xz, yy, yz, zz]);
             self.trace.store::<S>(at, [trace]);
             self.polynomial.store::<S>(at, [c0, c1, c2]);
@@ -525,10 +524,10 @@ impl Matrices {
             let (three, converged) = (Doubles::splat(3.0), Floats::splat(CONVERGED));
             let (mut slope, mut unsettled) = (Floats::splat(0.0), lanes);
             for _ in 0..STEPS {
-                slope = ((three * value - twice) * value + c1).narrow();
+                slope = c1.minus(twice.minus(three, value), value).narrow();
                 // The steps grow small: floats tell how far they go.
-                let off = (((value - c2) * value + c1) * value - c0).narrow();
-                value = value - (off / slope).widen();
+                let off = c0.minus(c1.plus(value - c2, value), value).narrow();
+                value = value + (off / slope).widen();
                 unsettled = !off.abs().lt(converged * slope * slope.abs()) & lanes;
                 if unsettled == 0 {
                     break;
@@ -554,8 +553,9 @@ impl Matrices {
             let ([slope], [trace]) = (self.slope.load::<S>(at), self.trace.load::<S>(at));
             // The adjugate of the matrix less the eigenvalue: each column is along the eigenvector.
             let (xx, yy, zz) = (xx - value, yy - value, zz - value);
-            let (a_xx, a_yy, a_zz) = (yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy);
-            let (a_xy, a_xz, a_yz) = (xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz);
+            let (a_xx, a_yy) = (minor(yy, zz, yz, yz), minor(xx, zz, xz, xz));
+            let (a_zz, a_xy) = (minor(xx, yy, xy, xy), minor(xz, yz, xy, zz));
+            let (a_xz, a_yz) = (minor(xy, yz, xz, yy), minor(xy, xz, xx, yz));
             let (a_xx, a_yy, a_zz) = (a_xx.narrow(), a_yy.narrow(), a_zz.narrow());
             let (a_xy, a_xz, a_yz) = (a_xy.narrow(), a_xz.narrow(), a_yz.narrow());
             // The column with the longest diagonal element.
@@ -567,7 +567,7 @@ impl Matrices {
                 let of_xy = S::select(is_y, columns[1][c].0, columns[0][c].0);
                 n[c] = Floats(S::select(is_z, columns[2][c].0, of_xy));
             }
-            let scale = Floats::splat(1.0) / dot(n, n).sqrt();
+            let scale = Floats::splat(1.0) / (n[0] * n[0]).plus(n[1], n[1]).plus(n[2], n[2]).sqrt();
             let value = value.narrow();
             let least = Floats::splat((DOUBT_SUMS * error) as f32);
             // Where the points lie on a line, the steps may end at the largest eigenvalue instead.
@@ -586,6 +586,17 @@ impl Matrices {
     }
 }
 
+/// `a * b - c * d`
+#[inline(always)]
+pub(crate) fn minor<S: Simd>(
+    a: Doubles<S>,
+    b: Doubles<S>,
+    c: Doubles<S>,
+    d: Doubles<S>,
+) -> Doubles<S> {
+    (a * b).minus(c, d)
+}
+
 /// The least root of value^3 - c2 value^2 + c1 value - c0, whose roots are real, by Viete's formula.
 ///
 /// # Safety
@@ -595,14 +606,14 @@ unsafe fn least_root<S: Simd>([c0, c1, c2]: [Floats<S>; 3]) -> Floats<S> {
     // SAFETY: as the caller's.
     unsafe {
         let splat = |value| Floats::<S>::splat(value);
-        let square = (c2 * c2 - splat(3.0) * c1).max(splat(0.0));
+        let square = (c2 * c2).minus(splat(3.0), c1).max(splat(0.0));
         let radius = square.sqrt();
         let cube = square * radius;
-        let q = (c2 * c2 - splat(4.5) * c1) * c2 + splat(13.5) * c0;
+        let q = (splat(13.5) * c0).plus((c2 * c2).minus(splat(4.5), c1), c2);
         // The angle a of the formula has the cosine q / cube; this is the sine of its half.
         let sine = (splat(0.5) * (cube - q) / cube).max(splat(0.0)).sqrt();
         let [first, others @ ..] = COSINES;
-        let cosine = others.into_iter().fold(splat(first), |sum, c| sum * sine + splat(c));
-        (c2 - splat(2.0) * radius * cosine) * splat(1.0 / 3.0)
+        let cosine = others.into_iter().fold(splat(first), |sum, c| splat(c).plus(sum, sine));
+        c2.minus(splat(2.0) * radius, cosine) * splat(1.0 / 3.0)
     }
 }

@@ -34,9 +34,9 @@ path!(portable, Portable);
 #[cfg(target_arch = "x86_64")]
 path!(sse2, Sse2);
 #[cfg(target_arch = "x86_64")]
-path!(avx2, Avx2, "avx2");
+path!(avx2, Avx2, "avx2,fma");
 #[cfg(target_arch = "x86_64")]
-path!(avx512, Avx512, "avx2,avx512f,avx512vl,avx512dq,avx512bw");
+path!(avx512, Avx512, "avx2,fma,avx512f,avx512vl,avx512dq,avx512bw");
 #[cfg(target_arch = "aarch64")]
 path!(neon, crate::simd::neon::Neon, "neon");
 

@@ -9,7 +9,7 @@ use super::twice::Twice;
 use super::x86::Avx2;
 use super::{Along, GROUP, Groups, Simd, load_points_by_fours};
 
-/// AVX-512 (F, VL, DQ, BW), on processors that have it.
+/// AVX-512 (F, VL, DQ, BW) and FMA, on processors that have them.
 #[derive(Clone, Copy)]
 pub(crate) struct Avx512;
 
@@ -34,6 +34,8 @@ impl Simd for Avx512 {
         sub(a: Self::F, b: Self::F) -> Self::F = Avx2::sub;
         mul(a: Self::F, b: Self::F) -> Self::F = Avx2::mul;
         div(a: Self::F, b: Self::F) -> Self::F = Avx2::div;
+        mul_add(a: Self::F, b: Self::F, c: Self::F) -> Self::F = Avx2::mul_add;
+        neg_mul_add(a: Self::F, b: Self::F, c: Self::F) -> Self::F = Avx2::neg_mul_add;
         sqrt(a: Self::F) -> Self::F = Avx2::sqrt;
         min(a: Self::F, b: Self::F) -> Self::F = Avx2::min;
         max(a: Self::F, b: Self::F) -> Self::F = Avx2::max;
@@ -67,6 +69,8 @@ impl Simd for Avx512 {
         sub_d(a: Self::D, b: Self::D) -> Self::D = _mm512_sub_pd;
         mul_d(a: Self::D, b: Self::D) -> Self::D = _mm512_mul_pd;
         div_d(a: Self::D, b: Self::D) -> Self::D = _mm512_div_pd;
+        mul_add_d(a: Self::D, b: Self::D, c: Self::D) -> Self::D = _mm512_fmadd_pd;
+        neg_mul_add_d(a: Self::D, b: Self::D, c: Self::D) -> Self::D = _mm512_fnmadd_pd;
         sqrt_d(a: Self::D) -> Self::D = _mm512_sqrt_pd;
         max_d(a: Self::D, b: Self::D) -> Self::D = _mm512_max_pd;
         widen(a: Self::F) -> Self::D = _mm512_cvtps_pd;
@@ -194,6 +198,8 @@ impl Simd for Avx512Pair {
         sub(a: Self::F, b: Self::F) -> Self::F = _mm512_sub_ps;
         mul(a: Self::F, b: Self::F) -> Self::F = _mm512_mul_ps;
         div(a: Self::F, b: Self::F) -> Self::F = _mm512_div_ps;
+        mul_add(a: Self::F, b: Self::F, c: Self::F) -> Self::F = _mm512_fmadd_ps;
+        neg_mul_add(a: Self::F, b: Self::F, c: Self::F) -> Self::F = _mm512_fnmadd_ps;
         sqrt(a: Self::F) -> Self::F = _mm512_sqrt_ps;
         min(a: Self::F, b: Self::F) -> Self::F = _mm512_min_ps;
         max(a: Self::F, b: Self::F) -> Self::F = _mm512_max_ps;
@@ -216,6 +222,8 @@ impl Simd for Avx512Pair {
         sub_d(a: Self::D, b: Self::D) -> Self::D = TwoGroups::sub_d;
         mul_d(a: Self::D, b: Self::D) -> Self::D = TwoGroups::mul_d;
         div_d(a: Self::D, b: Self::D) -> Self::D = TwoGroups::div_d;
+        mul_add_d(a: Self::D, b: Self::D, c: Self::D) -> Self::D = TwoGroups::mul_add_d;
+        neg_mul_add_d(a: Self::D, b: Self::D, c: Self::D) -> Self::D = TwoGroups::neg_mul_add_d;
         sqrt_d(a: Self::D) -> Self::D = TwoGroups::sqrt_d;
         max_d(a: Self::D, b: Self::D) -> Self::D = TwoGroups::max_d;
         bits_lt_d(a: Self::D, b: Self::D) -> u32 = TwoGroups::bits_lt_d;

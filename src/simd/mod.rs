@@ -1,7 +1,8 @@
 //! Eight pixels at a time on every instruction set, or sixteen as pairs of eight.
 //!
 //! Algorithms are written once, over [`Simd`], in `#[inline(always)]` functions; only the outermost function of a
-//! path is compiled for its instruction set. No operation fuses or reorders, so every path gives the same bits.
+//! path is compiled for its instruction set. No operation reorders, and products are fused with sums only where that is
+//! asked for: so all paths that fuse give the same bits, and so do all that cannot.
 
 /// Applies an intrinsic to each of a group's registers: written out, as compilers take minutes over so many small
 /// loops.
@@ -75,6 +76,18 @@ pub(crate) trait Simd: Copy {
     unsafe fn sub(a: Self::F, b: Self::F) -> Self::F;
     unsafe fn mul(a: Self::F, b: Self::F) -> Self::F;
     unsafe fn div(a: Self::F, b: Self::F) -> Self::F;
+    /// `a * b + c`, rounded once where the instruction set can, else twice.
+    #[inline(always)]
+    unsafe fn mul_add(a: Self::F, b: Self::F, c: Self::F) -> Self::F {
+        // SAFETY: as the caller's.
+        unsafe { Self::add(Self::mul(a, b), c) }
+    }
+    /// `c - a * b`, likewise.
+    #[inline(always)]
+    unsafe fn neg_mul_add(a: Self::F, b: Self::F, c: Self::F) -> Self::F {
+        // SAFETY: as the caller's.
+        unsafe { Self::sub(c, Self::mul(a, b)) }
+    }
     unsafe fn sqrt(a: Self::F) -> Self::F;
     /// `a < b ? a : b`
     unsafe fn min(a: Self::F, b: Self::F) -> Self::F;
@@ -118,6 +131,18 @@ pub(crate) trait Simd: Copy {
     unsafe fn sub_d(a: Self::D, b: Self::D) -> Self::D;
     unsafe fn mul_d(a: Self::D, b: Self::D) -> Self::D;
     unsafe fn div_d(a: Self::D, b: Self::D) -> Self::D;
+    /// As [`Simd::mul_add`].
+    #[inline(always)]
+    unsafe fn mul_add_d(a: Self::D, b: Self::D, c: Self::D) -> Self::D {
+        // SAFETY: as the caller's.
+        unsafe { Self::add_d(Self::mul_d(a, b), c) }
+    }
+    /// As [`Simd::neg_mul_add`].
+    #[inline(always)]
+    unsafe fn neg_mul_add_d(a: Self::D, b: Self::D, c: Self::D) -> Self::D {
+        // SAFETY: as the caller's.
+        unsafe { Self::sub_d(c, Self::mul_d(a, b)) }
+    }
     unsafe fn sqrt_d(a: Self::D) -> Self::D;
     unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D;
     /// Bit l is `a < b` in lane l.

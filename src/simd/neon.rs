@@ -21,6 +21,23 @@ macro_rules! bitwise {
     }};
 }
 
+/// Intrinsics that take the sum first, as methods that take it last.
+macro_rules! sum_last {
+    ($($name:ident($type:ty) = $op:path;)*) => {
+        $(#[inline(always)]
+        unsafe fn $name(a: $type, b: $type, c: $type) -> $type {
+            unsafe { $op(c, a, b) }
+        })*
+    };
+}
+
+sum_last! {
+    mul_add_32(float32x4_t) = vfmaq_f32;
+    neg_mul_add_32(float32x4_t) = vfmsq_f32;
+    mul_add_64(float64x2_t) = vfmaq_f64;
+    neg_mul_add_64(float64x2_t) = vfmsq_f64;
+}
+
 /// The masks of lanes 0 to 3 and of lanes 4 to 7.
 #[inline(always)]
 unsafe fn lane_masks(lanes: u32) -> [uint32x4_t; 2] {
@@ -42,6 +59,8 @@ impl Simd for Neon {
         sub(a: Self::F, b: Self::F) -> Self::F = vsubq_f32;
         mul(a: Self::F, b: Self::F) -> Self::F = vmulq_f32;
         div(a: Self::F, b: Self::F) -> Self::F = vdivq_f32;
+        mul_add(a: Self::F, b: Self::F, c: Self::F) -> Self::F = mul_add_32;
+        neg_mul_add(a: Self::F, b: Self::F, c: Self::F) -> Self::F = neg_mul_add_32;
         sqrt(a: Self::F) -> Self::F = vsqrtq_f32;
         add_i(a: Self::I, b: Self::I) -> Self::I = vaddq_s32;
         sub_i(a: Self::I, b: Self::I) -> Self::I = vsubq_s32;
@@ -55,6 +74,8 @@ impl Simd for Neon {
         sub_d(a: Self::D, b: Self::D) -> Self::D = vsubq_f64;
         mul_d(a: Self::D, b: Self::D) -> Self::D = vmulq_f64;
         div_d(a: Self::D, b: Self::D) -> Self::D = vdivq_f64;
+        mul_add_d(a: Self::D, b: Self::D, c: Self::D) -> Self::D = mul_add_64;
+        neg_mul_add_d(a: Self::D, b: Self::D, c: Self::D) -> Self::D = neg_mul_add_64;
         sqrt_d(a: Self::D) -> Self::D = vsqrtq_f64;
     }
 

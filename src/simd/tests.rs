@@ -266,6 +266,40 @@ unsafe fn assert_stores_points<S: Simd>() {
     }
 }
 
+/// Products are added and subtracted, rounded once if `fuses`, else twice.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+unsafe fn assert_adds_products<S: Simd>(fuses: bool) {
+    for (a, b) in floats() {
+        let c: [f32; 16] = std::array::from_fn(|l| b[(l + 5) % 16] - a[l]);
+        let (mut found, mut expected) = (Results::default(), Results::default());
+        // SAFETY: as the caller's; no more than sixteen lanes are loaded.
+        unsafe {
+            let [x, y, z] = [a, b, c].map(|lanes| S::load(lanes.as_ptr()));
+            found.floats::<S>([S::mul_add(x, y, z), S::neg_mul_add(x, y, z)]);
+            // Doubles hold products of floats, but not of their thirds.
+            let third = S::splat_d(1.0 / 3.0);
+            let [x, y, z] = [x, y, z].map(|lanes| S::mul_d(S::widen(lanes), third));
+            found.doubles::<S>([S::mul_add_d(x, y, z), S::neg_mul_add_d(x, y, z)]);
+        }
+        for sign in [1.0, -1.0] {
+            let lanes = (0..S::LANES).map(|l| (sign * a[l], b[l], c[l]));
+            let sum = |(a, b, c): (f32, f32, f32)| if fuses { a.mul_add(b, c) } else { a * b + c };
+            let bits = |v: f32| u64::from(if v.is_nan() { f32::NAN } else { v }.to_bits());
+            expected.0.extend(lanes.map(sum).map(bits));
+        }
+        for sign in [1.0, -1.0] {
+            let third = |v: f32| f64::from(v) * (1.0 / 3.0);
+            let lanes = (0..S::LANES).map(|l| (sign * third(a[l]), third(b[l]), third(c[l])));
+            let sum = |(a, b, c): (f64, f64, f64)| if fuses { a.mul_add(b, c) } else { a * b + c };
+            let bits = |v: f64| if v.is_nan() { f64::NAN } else { v }.to_bits();
+            expected.0.extend(lanes.map(sum).map(bits));
+        }
+        assert_eq!(found, expected, "{a:?} {b:?} {c:?}");
+    }
+}
+
 /// Integers of numbers that fit, to the nearest and towards zero.
 ///
 /// # Safety
@@ -280,7 +314,7 @@ unsafe fn small<S: Simd>(values: [S::F; 2]) -> [S::I; 2] {
 
 /// # Safety
 /// The processor has the instruction set of `S`.
-unsafe fn assert_as_portable<S: Groups>() {
+unsafe fn assert_as_portable<S: Groups>(fuses: bool) {
     // SAFETY: as the caller's, and the portable path runs everywhere.
     unsafe {
         assert_goes_along::<Portable>();
@@ -292,6 +326,9 @@ unsafe fn assert_as_portable<S: Groups>() {
         assert_stores_points::<S>();
         assert_loads_points::<S::Pair>();
         assert_stores_points::<S::Pair>();
+        assert_adds_products::<Portable>(false);
+        assert_adds_products::<S>(fuses);
+        assert_adds_products::<S::Pair>(fuses);
     }
     for (a, b) in floats() {
         // SAFETY: as the caller's, and the portable path runs everywhere.
@@ -311,12 +348,12 @@ fn operations_of_x86_equal_the_portable_ones() {
     use crate::isa::Isa;
     // SAFETY: SSE2 is part of every x86-64, and the others are there.
     unsafe {
-        assert_as_portable::<x86::Sse2>();
+        assert_as_portable::<x86::Sse2>(false);
         if Isa::Avx2.is_available() {
-            assert_as_portable::<x86::Avx2>();
+            assert_as_portable::<x86::Avx2>(true);
         }
         if Isa::Avx512.is_available() {
-            assert_as_portable::<Avx512>();
+            assert_as_portable::<Avx512>(true);
         }
     }
 }
@@ -325,5 +362,5 @@ fn operations_of_x86_equal_the_portable_ones() {
 #[test]
 fn operations_of_neon_equal_the_portable_ones() {
     // SAFETY: NEON is part of every 64-bit Arm.
-    unsafe { assert_as_portable::<super::neon::Neon>() };
+    unsafe { assert_as_portable::<super::neon::Neon>(true) };
 }

@@ -27,6 +27,8 @@ impl<S: Simd> Simd for Twice<S> {
         sub(a: F, b: F) -> F;
         mul(a: F, b: F) -> F;
         div(a: F, b: F) -> F;
+        mul_add(a: F, b: F, c: F) -> F;
+        neg_mul_add(a: F, b: F, c: F) -> F;
         sqrt(a: F) -> F;
         min(a: F, b: F) -> F;
         max(a: F, b: F) -> F;
@@ -47,6 +49,8 @@ impl<S: Simd> Simd for Twice<S> {
         sub_d(a: D, b: D) -> D;
         mul_d(a: D, b: D) -> D;
         div_d(a: D, b: D) -> D;
+        mul_add_d(a: D, b: D, c: D) -> D;
+        neg_mul_add_d(a: D, b: D, c: D) -> D;
         sqrt_d(a: D) -> D;
         max_d(a: D, b: D) -> D;
         widen(a: F) -> D;

@@ -388,6 +388,8 @@ impl Simd for Avx2 {
         sub(a: Self::F, b: Self::F) -> Self::F = _mm256_sub_ps;
         mul(a: Self::F, b: Self::F) -> Self::F = _mm256_mul_ps;
         div(a: Self::F, b: Self::F) -> Self::F = _mm256_div_ps;
+        mul_add(a: Self::F, b: Self::F, c: Self::F) -> Self::F = _mm256_fmadd_ps;
+        neg_mul_add(a: Self::F, b: Self::F, c: Self::F) -> Self::F = _mm256_fnmadd_ps;
         sqrt(a: Self::F) -> Self::F = _mm256_sqrt_ps;
         min(a: Self::F, b: Self::F) -> Self::F = _mm256_min_ps;
         max(a: Self::F, b: Self::F) -> Self::F = _mm256_max_ps;
@@ -411,6 +413,8 @@ impl Simd for Avx2 {
         sub_d(a: Self::D, b: Self::D) -> Self::D = _mm256_sub_pd;
         mul_d(a: Self::D, b: Self::D) -> Self::D = _mm256_mul_pd;
         div_d(a: Self::D, b: Self::D) -> Self::D = _mm256_div_pd;
+        mul_add_d(a: Self::D, b: Self::D, c: Self::D) -> Self::D = _mm256_fmadd_pd;
+        neg_mul_add_d(a: Self::D, b: Self::D, c: Self::D) -> Self::D = _mm256_fnmadd_pd;
         sqrt_d(a: Self::D) -> Self::D = _mm256_sqrt_pd;
         max_d(a: Self::D, b: Self::D) -> Self::D = _mm256_max_pd;
     }

@@ -282,6 +282,11 @@ pub fn fast_isas() -> impl Iterator<Item = Isa> {
     Isa::ALL.into_iter().filter(|isa| *isa != Isa::Scalar && isa.is_available())
 }
 
+/// Whether an instruction set adds products rounded once.
+pub fn fuses(isa: Isa) -> bool {
+    matches!(isa, Isa::Avx2 | Isa::Avx512 | Isa::Neon)
+}
+
 pub fn options(
     (method, border_policy): (Method, BorderPolicy),
     normal_smoothing_size: f32,

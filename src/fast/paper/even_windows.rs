@@ -9,7 +9,7 @@ use super::tile::{Run, Tile};
 use crate::fast::Parts;
 use crate::fast::arithmetic::{Doubles, Floats};
 use crate::fast::lanes::LANES;
-use crate::fast::moments::Matrices;
+use crate::fast::moments::{Matrices, minor};
 use crate::fast::run::RUN;
 use crate::fast::sink::Sink;
 use crate::fast::tile::{Bits, all};
@@ -352,14 +352,16 @@ impl EvenTile<'_> {
         unsafe {
             let share = Doubles::splat(1.0) / n;
             let (x, y, z) = (sx * share, sy * share, sz * share);
-            let (xx, yy, zz) = (xx * share - x * x, yy * share - y * y, zz * share - z * z);
-            let (xy, yz, xz) = (xy * share - x * y, yz * share - y * z, xz * share - x * z);
+            let (xx, yy) = ((xx * share).minus(x, x), (yy * share).minus(y, y));
+            let (zz, xy) = ((zz * share).minus(z, z), (xy * share).minus(x, y));
+            let (yz, xz) = ((yz * share).minus(y, z), (xz * share).minus(x, z));
             let mut m = [x, y, z];
             for c in 0..3 {
                 m[c] = m[c] + Doubles::splat(origin[c].into());
             }
-            let [axx, axy, axz] = [yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy];
-            let [ayy, ayz, azz] = [xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy];
+            let (axx, axy) = (minor(yy, zz, yz, yz), minor(xz, yz, xy, zz));
+            let (axz, ayy) = (minor(xy, yz, xz, yy), minor(xx, zz, xz, xz));
+            let (ayz, azz) = (minor(xy, xz, xx, yz), minor(xx, yy, xy, xy));
             let across = times([axx, axy, axz, ayy, ayz, azz], m);
             let along = times([xx, xy, xz, yy, yz, zz], m);
             let (spread, length2, along) = (dot(m, across), dot(m, m), dot(m, along));
@@ -368,7 +370,7 @@ impl EvenTile<'_> {
             let (seen, line) =
                 (spread * length2, Doubles::splat(Plane::LINE) * half_trace * half_trace);
             let enough = Doubles::splat(Plane::FEWEST - 0.5).lt(n);
-            let determinant = (xx * axx + xy * axy + xz * axz).max(Doubles::splat(0.0));
+            let determinant = (xx * axx).plus(xy, axy).plus(xz, axz).max(Doubles::splat(0.0));
             let scale = Doubles::splat(1.0) / (spread + determinant);
             let q = [across[0] * scale, across[1] * scale, across[2] * scale];
             let (q2, below) = (dot(q, q), n - Doubles::splat(3.0));
@@ -489,7 +491,11 @@ fn times<S: Groups>(
     [xx, xy, xz, yy, yz, zz]: [Doubles<S>; 6],
     [x, y, z]: [Doubles<S>; 3],
 ) -> [Doubles<S>; 3] {
-    [xx * x + xy * y + xz * z, xy * x + yy * y + yz * z, xz * x + yz * y + zz * z]
+    [
+        (xx * x).plus(xy, y).plus(xz, z),
+        (xy * x).plus(yy, y).plus(yz, z),
+        (xz * x).plus(yz, y).plus(zz, z),
+    ]
 }
 
 /// How many columns or rows, of so many, windows around `at` have.
