@@ -12,7 +12,7 @@ use super::{Along, GROUP, Groups, Simd, load_points_by_fours};
 #[derive(Clone, Copy)]
 pub(crate) struct Sse2;
 
-/// AVX2, on processors that have it.
+/// AVX2 and FMA, on processors that have them.
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2;
 
