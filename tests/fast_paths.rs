@@ -45,14 +45,16 @@ impl Worst {
                     first,
                     &found,
                     cloud.width,
-                    &format!("{isa:?}, {what}, {options:?}"),
+                    &format!("{isa:?} and the first of its kind, {what}, {options:?}"),
                 ),
                 none => *none = Some(found),
             }
         }
+        let [portable, fused] = first;
+        let portable = portable.expect("the portable path is always there");
         let pixels = || plain.iter().enumerate();
-        let fast = first.iter().flatten().flat_map(|fast| fast.iter().zip(pixels()));
-        for (fast, (at, plain)) in fast {
+        let fast = std::iter::once(&portable).chain(&fused);
+        for (fast, (at, plain)) in fast.flat_map(|fast| fast.iter().zip(pixels())) {
             let place = || {
                 let (x, y) = (at % cloud.width, at / cloud.width);
                 format!("{what} pixel {x},{y}: {fast:?}, plain {plain:?}; {options:?}")

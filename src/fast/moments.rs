@@ -13,6 +13,7 @@ use crate::memory::{bytes, make_room};
 use crate::methods::Estimate;
 use crate::paper::ROUNDING;
 use crate::simd::{GROUP, Groups, Simd};
+use crate::vector::dot;
 use crate::window::Image;
 
 /// x, y, z, xx, xy, xz, yy, yz, zz
@@ -567,7 +568,7 @@ impl Matrices {
                 let of_xy = S::select(is_y, columns[1][c].0, columns[0][c].0);
                 n[c] = Floats(S::select(is_z, columns[2][c].0, of_xy));
             }
-            let scale = Floats::splat(1.0) / (n[0] * n[0]).plus(n[1], n[1]).plus(n[2], n[2]).sqrt();
+            let scale = Floats::splat(1.0) / dot(n, n).sqrt();
             let value = value.narrow();
             let least = Floats::splat((DOUBT_SUMS * error) as f32);
             // Where the points lie on a line, the steps may end at the largest eigenvalue instead.
