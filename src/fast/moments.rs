@@ -238,16 +238,11 @@ pub(crate) unsafe fn push_eight<S: Groups>(
     // SAFETY: as the caller's.
     unsafe {
         let pixels = S::transpose_d(values);
-        // What a pixel waits for is one addition a group: that to the carry.
-        let mut along = pixels[0];
         for lane in 0..GROUP {
-            if lane > 0 {
-                along = S::add_d(along, pixels[lane]);
-            }
-            let sum = S::add_d(S::add_d(along, *carry), S::load_d(above.add(8 * lane)));
+            *carry = S::add_d(*carry, pixels[lane]);
+            let sum = S::add_d(*carry, S::load_d(above.add(8 * lane)));
             S::store_d(own.add(8 * lane), sum);
         }
-        *carry = S::add_d(along, *carry);
     }
 }
 

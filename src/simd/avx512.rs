@@ -168,6 +168,23 @@ impl Groups for Avx512 {
             [_mm512_permutex2var_pd(first, even, last), _mm512_permutex2var_pd(first, odd, last)]
         }
     }
+    // Not by fours: operations of three operands, as theirs, hold up stores of whole registers on Zen 5.
+    #[inline(always)]
+    unsafe fn transpose_d([a, b, c, d, e, f, g, h]: [Self::D; 8]) -> [Self::D; 8] {
+        unsafe {
+            let (ab, cd) = (pairs_of_lanes(a, b), pairs_of_lanes(c, d));
+            let (ef, gh) = (pairs_of_lanes(e, f), pairs_of_lanes(g, h));
+            let mut lanes = [a; 8];
+            for odd in 0..2 {
+                let (abcd, efgh) = (alternate(ab[odd], cd[odd]), alternate(ef[odd], gh[odd]));
+                for second in 0..2 {
+                    let lane = 2 * second + odd;
+                    [lanes[lane], lanes[lane + 4]] = alternate(abcd[second], efgh[second]);
+                }
+            }
+            lanes
+        }
+    }
     #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
         unsafe {
@@ -182,6 +199,18 @@ impl Groups for Avx512 {
     unsafe fn last_d(a: Self::D) -> Self::D {
         unsafe { _mm512_permutexvar_pd(_mm512_set1_epi64(7), a) }
     }
+}
+
+/// The even lanes of both, in pairs, and the odd ones.
+#[inline(always)]
+unsafe fn pairs_of_lanes(a: __m512d, b: __m512d) -> [__m512d; 2] {
+    unsafe { [_mm512_unpacklo_pd(a, b), _mm512_unpackhi_pd(a, b)] }
+}
+
+/// Of four pairs of lanes each, the first and third of both, and the second and fourth.
+#[inline(always)]
+unsafe fn alternate(a: __m512d, b: __m512d) -> [__m512d; 2] {
+    unsafe { [_mm512_shuffle_f64x2::<0x88>(a, b), _mm512_shuffle_f64x2::<0xdd>(a, b)] }
 }
 
 impl Simd for Avx512Pair {
