@@ -13,6 +13,9 @@ use crate::vector::{cross, difference, dot};
 
 /// What depths are summed up in.
 pub(crate) trait Depth: Lane + Number {
+    /// [`Sums::EXACT`](super::tile::Sums::EXACT)
+    const EXACT: bool;
+
     /// As many lanes as are added along a row at once.
     type Along<S: Groups>: Simd;
 
@@ -46,6 +49,8 @@ pub(crate) trait Depth: Lane + Number {
 }
 
 impl Depth for f64 {
+    const EXACT: bool = false;
+
     type Along<S: Groups> = S;
 
     fn error(_scale: f32, limit: f32, held: usize) -> f64 {
@@ -91,6 +96,8 @@ impl Depth for f64 {
 }
 
 impl Depth for i32 {
+    const EXACT: bool = true;
+
     type Along<S: Groups> = S::Widest;
 
     fn error(scale: f32, _limit: f32, _held: usize) -> f64 {

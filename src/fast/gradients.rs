@@ -142,12 +142,14 @@ impl Gradients {
 }
 
 /// How coordinates become integers.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, PartialEq)]
 pub(crate) struct Scale {
     origin: [f32; 3],
     scale: f32,
     /// What rounding to integers moves the sums over a window of side 1 by at most, over [`DOUBT`].
     doubt: f32,
+    /// The largest magnitude of a coordinate, counted from the origin, that sums hold.
+    pub limit: f32,
 }
 
 /// A normal is doubtful where rounding to integers could turn it by more than this, if one coordinate of each gradient were
@@ -169,7 +171,9 @@ impl Scale {
             bits = bits.min(25.0 - f64::from(limit).log2());
             doubt *= 2.0;
         }
-        Scale { origin, scale: (bits.ceil() - 1.0).clamp(-120.0, 120.0).exp2() as f32, doubt }
+        let scale = (bits.ceil() - 1.0).clamp(-120.0, 120.0).exp2();
+        let most = ((31_f64.exp2() / (strips * side) as f64 - 0.5) / scale) as f32;
+        Scale { origin, scale: scale as f32, doubt, limit: most.next_down().max(limit) }
     }
 
     /// Coordinates `c`, as integers.

@@ -24,6 +24,8 @@ pub(crate) struct HalfWindows<T> {
     pushed: usize,
     /// What depths are multiplied by.
     scale: f32,
+    /// Whether that is so of the rows that were pushed before, too.
+    is_same_scale: bool,
     /// [`DOUBT_ROUNDING`] times the square of what the sums' rounding errors stay below.
     doubt: f32,
     /// By half of the side of a window.
@@ -88,6 +90,7 @@ unsafe fn sum_between<S: Simd, T: Lane>(
 impl<T: Depth> HalfWindows<T> {
     /// With depths multiplied so.
     pub fn scaled(&mut self, scale: f32) -> &mut Self {
+        self.is_same_scale = scale == self.scale;
         self.scale = scale;
         self
     }
@@ -208,6 +211,7 @@ impl<T: Depth> Sums for HalfWindows<T> {
     const COLUMN: usize = size_of::<T>();
     const CURVATURE: bool = false;
     const LIMITED: bool = false;
+    const EXACT: bool = T::EXACT;
 
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {
         frame.reserve_ring(&mut self.integrals)?;
@@ -218,6 +222,10 @@ impl<T: Depth> Sums for HalfWindows<T> {
         self.pushed = frame.start_ring(&mut self.integrals);
         let error = T::error(self.scale, limit, frame.columns.len() * frame.rows.len());
         self.doubt = (DOUBT_ROUNDING * error * error) as f32;
+    }
+
+    fn goes_on(&self, _limit: f32, _side: usize, _origin: [f32; 3]) -> bool {
+        T::EXACT && self.is_same_scale
     }
 
     fn size(&self) -> usize {

@@ -3,7 +3,8 @@
 //! First the windows of a slice of the image's rows (`windows`), then tile by tile, and if need be layer by layer
 //! (`layers`), the points (`planes`, `incomplete`), the method's rings of sums (`strip_pairs`, `strips`, `moments`,
 //! `half_windows`) and, run by run (`run`), the normals (`tile`, `one_point`). Slices are made of whole strips; strips,
-//! tiles and layers are fixed by the frame and the options, so that results do not depend on the number of threads.
+//! tiles and layers are fixed by the frame and the options, so that results do not depend on the number of threads. Rings
+//! of integers go on from one strip to the next where a thread makes both: their sums are the same to the bit.
 
 mod arithmetic;
 mod buffer;
@@ -248,6 +249,7 @@ fn compute_slices(
     for scratch in &each[..workers.count()] {
         let WorkerScratch { windows, sums, .. } = &mut *lock(scratch);
         windows.start(points, options, job.row(job.per_slice), expected)?;
+        sums.frame = Frame::default();
         if output.is_some() {
             sums.reserve(&job, true, columns, side)?;
         }

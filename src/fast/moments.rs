@@ -252,6 +252,7 @@ impl Sums for Moments {
     const COLUMN: usize = CHANNELS * size_of::<f64>();
     const CURVATURE: bool = true;
     const LIMITED: bool = false;
+    const EXACT: bool = false;
 
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {
         frame.reserve_ring(&mut self.most)?;

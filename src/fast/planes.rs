@@ -63,6 +63,14 @@ impl Frame {
         Frame::new(0..(GROUP + columns + side + 2).min(width), 0..0, side.min(height))
     }
 
+    /// Whether the rows of another frame, all of which are in its rings, are followed by this one's, and those of these that
+    /// it has are held, in the same places.
+    pub fn goes_on(&self, above: &Frame) -> bool {
+        (&self.columns, self.stride, self.ring) == (&above.columns, above.stride, above.ring)
+            && above.rows.start <= self.rows.start
+            && (self.rows.start..=self.rows.end).contains(&above.rows.end)
+    }
+
     /// Steps of so many lanes that go over the columns and a group behind them.
     pub fn steps<S: Simd>(&self) -> usize {
         (self.columns.len().next_multiple_of(GROUP) + GROUP).div_ceil(S::LANES)

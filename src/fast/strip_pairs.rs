@@ -140,6 +140,7 @@ impl Sums for StripPairs {
     const COLUMN: usize = PIXEL;
     const CURVATURE: bool = false;
     const LIMITED: bool = true;
+    const EXACT: bool = true;
 
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {
         self.ring.grow(frame.start_of(1, frame.ring))?;
@@ -153,6 +154,14 @@ impl Sums for StripPairs {
         self.columns.fill(0);
         self.last.fill(0); // it is what is above the first row
         self.scale = Scale::new(4, limit, side, origin);
+    }
+
+    fn goes_on(&self, limit: f32, side: usize, origin: [f32; 3]) -> bool {
+        self.scale == Scale::new(4, limit, side, origin)
+    }
+
+    fn limit(&self) -> f32 {
+        self.scale.limit
     }
 
     fn size(&self) -> usize {

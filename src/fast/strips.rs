@@ -91,6 +91,7 @@ impl Sums for Strips {
     const COLUMN: usize = PIXEL;
     const CURVATURE: bool = false;
     const LIMITED: bool = true;
+    const EXACT: bool = true;
 
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error> {
         self.ring.grow(frame.start_of(1, frame.ring))?;
@@ -101,6 +102,14 @@ impl Sums for Strips {
     fn start(&mut self, _frame: &Frame, limit: f32, side: usize, origin: [f32; 3]) {
         self.columns.fill(0);
         self.scale = Scale::new(2, limit, side, origin);
+    }
+
+    fn goes_on(&self, limit: f32, side: usize, origin: [f32; 3]) -> bool {
+        self.scale == Scale::new(2, limit, side, origin)
+    }
+
+    fn limit(&self) -> f32 {
+        self.scale.limit
     }
 
     fn size(&self) -> usize {

@@ -1,6 +1,7 @@
 //! Steps 4 and 5, fast, for one tile of the image: rows of points go through rings of sums, every pair of groups of eight
 //! pixels takes its windows' sums from them, and normals are made run by run.
 
+use std::mem;
 use std::ops::{Range, RangeInclusive};
 
 use super::arithmetic::Floats;
@@ -124,12 +125,25 @@ pub(crate) trait Sums {
     /// Whether sums go wrong where a coordinate is beyond the limit: the camera is the origin where that will do.
     const LIMITED: bool;
 
+    /// Whether windows' sums are the same to the bit wherever the rings were started, as those of integers are.
+    const EXACT: bool;
+
     /// Makes room for frames that are no larger, and windows of up to `side`.
     fn reserve(&mut self, frame: &Frame, side: usize) -> Result<(), Error>;
 
     /// Forgets the rows pushed before. `side` bounds the windows, `limit` the depths, and where the method is
     /// [`Sums::LIMITED`] all coordinates, counted from the origin.
     fn start(&mut self, frame: &Frame, limit: f32, side: usize, origin: [f32; 3]);
+
+    /// Whether nothing but the rows that are held would change if this were started so, where sums are [`Sums::EXACT`].
+    fn goes_on(&self, _limit: f32, _side: usize, _origin: [f32; 3]) -> bool {
+        false
+    }
+
+    /// The largest magnitude of x or y that sums are right with, as they were started.
+    fn limit(&self) -> f32 {
+        f32::INFINITY
+    }
 
     /// Bytes held.
     fn size(&self) -> usize;
@@ -192,6 +206,17 @@ pub(crate) struct Tile<'a> {
     pub sides: Sides<'a>,
 }
 
+/// How the rows of a layer of a tile are gone through.
+struct Pass<'a> {
+    layer: &'a Layer,
+    /// A point of the layer, which stands in place of missing ones.
+    origin: [f32; 3],
+    /// The largest magnitude of x or y that the sums allow.
+    limit: f32,
+    /// The first row to push: those of the frame above it are held.
+    next: usize,
+}
+
 /// A point farther from the camera's axis than the sums allow.
 struct BeyondLimit;
 
@@ -213,6 +238,9 @@ impl Tile<'_> {
             unsafe { self.write_none::<S>(sink) };
         }
         let size = (self.image.width, self.image.height);
+        // What the rings hold, if the last tile's sums can be gone on with.
+        let above = mem::take(frame);
+        let is_one = self.layers.len() == 1;
         for layer in self.layers {
             let Some(origin) = self.origin(layer) else {
                 if layer.is_all() {
@@ -224,13 +252,18 @@ impl Tile<'_> {
             let side = layer.side;
             *frame = Frame::around(&self.columns, &self.rows, side, size);
             // Seldom is a point farther from the camera's axis than the deepest one from the camera.
-            let (first, mut limit) =
-                if M::LIMITED { ([0.0; 3], layer.deepest) } else { (origin, f32::INFINITY) };
-            sums.start(frame, layer.deepest, side, first);
+            let first = if M::LIMITED { [0.0; 3] } else { origin };
+            let goes_on = is_one && frame.goes_on(&above);
+            let goes_on = goes_on && sums.goes_on(layer.deepest, side, first);
+            if !goes_on {
+                sums.start(frame, layer.deepest, side, first);
+            }
+            let mut next = if goes_on { above.rows.end } else { frame.rows.start };
+            let mut limit = sums.limit();
             loop {
+                let pass = Pass { layer, origin, limit, next };
                 // SAFETY: as the caller's.
-                let done =
-                    unsafe { self.rows::<S, M>(frame, planes, sums, sink, layer, (origin, limit)) };
+                let done = unsafe { self.rows::<S, M>(frame, planes, sums, sink, &pass) };
                 let Err(BeyondLimit) = done else { break };
                 // SAFETY: as the caller's.
                 let extent = unsafe { self.extent::<S>(frame, planes, layer, origin) };
@@ -240,8 +273,11 @@ impl Tile<'_> {
                     // Floats do not hold the way from there.
                     sums.start(frame, f32::MAX, side, [0.0; 3]);
                 }
-                limit = f32::INFINITY;
+                (limit, next) = (f32::INFINITY, frame.rows.start);
             }
+        }
+        if !(is_one && M::EXACT) {
+            *frame = Frame::default();
         }
     }
 
@@ -303,8 +339,7 @@ impl Tile<'_> {
         f32::from_bits(largest)
     }
 
-    /// Computes all rows, with the origin in place of missing points; what was written before x or y of a point was
-    /// beyond the limit must be written again.
+    /// Computes all rows; what was written before x or y of a point was beyond the limit must be written again.
     ///
     /// # Safety
     /// As [`Tile::compute`].
@@ -315,14 +350,15 @@ impl Tile<'_> {
         planes: &mut Planes,
         sums: &mut M,
         sink: &Sink,
-        layer: &Layer,
-        (origin, limit): ([f32; 3], f32),
+        pass: &Pass,
     ) -> Result<(), BeyondLimit> {
+        let &Pass { layer, origin, limit, mut next } = pass;
         let &Layer { held, side, .. } = layer;
         let mut run = Run::default();
         let (before, after) = window_reach(side);
-        let mut next = frame.rows.start;
-        planes.incomplete.start();
+        if next == frame.rows.start {
+            planes.incomplete.start();
+        }
         for y in self.rows.clone() {
             while next < (y + after + 1).min(self.image.height) {
                 // SAFETY: as the caller's.
