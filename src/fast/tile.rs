@@ -263,7 +263,7 @@ impl Tile<'_> {
             loop {
                 let pass = Pass { layer, origin, limit, next };
                 // SAFETY: as the caller's.
-                let done = unsafe { self.rows::<S, M>(frame, planes, sums, sink, &pass) };
+                let done = unsafe { self.rows::<S, M>(frame, planes, sums, sink, pass) };
                 let Err(BeyondLimit) = done else { break };
                 // SAFETY: as the caller's.
                 let extent = unsafe { self.extent::<S>(frame, planes, layer, origin) };
@@ -350,9 +350,9 @@ impl Tile<'_> {
         planes: &mut Planes,
         sums: &mut M,
         sink: &Sink,
-        pass: &Pass,
+        pass: Pass,
     ) -> Result<(), BeyondLimit> {
-        let &Pass { layer, origin, limit, mut next } = pass;
+        let Pass { layer, origin, limit, mut next } = pass;
         let &Layer { held, side, .. } = layer;
         let mut run = Run::default();
         let (before, after) = window_reach(side);
