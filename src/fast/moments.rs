@@ -34,19 +34,12 @@ pub(crate) struct Moments {
     /// What the sums' rounding errors stay below.
     error: f64,
     /// By the side of a window.
-    places: Vec<Place>,
+    places: Vec<Corners>,
 }
 
-/// What a window of a side is the sum of. A window of no side has no sum.
-#[derive(Clone, Copy, Debug)]
-struct Place {
-    /// In numbers of the ring of most moments, which are as many bytes of the other one: both are addresses at once.
-    corners: Corners,
-    /// One over its points.
-    share: f64,
-}
-
-/// Of what is above and below, left and right. Before a pixel's column is added, places may be wrapped around zero.
+/// What a window is the sum of, above and below, left and right: in numbers of the ring of most moments, which are as many
+/// bytes of the other one, so that both are addresses at once. Before a pixel's column is added, places may be wrapped
+/// around zero. A window of no side has no sum.
 type Corners = [[usize; 2]; 2];
 
 /// The sums of most moments of the window of a pixel.
@@ -103,7 +96,7 @@ impl Moments {
     #[inline(always)]
     unsafe fn of_side<S: Groups>(&self, frame: &Frame, x: usize, side: usize, to: &mut Lanewise) {
         let [most, z] = self.at(frame.column(x));
-        let Place { corners, share } = self.places[side];
+        let corners = self.places[side];
         // SAFETY: as the caller's: rows and columns are held, and so is the group from this column on.
         unsafe {
             for lane in 0..GROUP {
@@ -112,7 +105,6 @@ impl Moments {
             }
             let z = |corner| Doubles::<S>(S::load_d(z.wrapping_byte_add(corner)));
             S::store_d(to.z.as_mut_ptr(), between(corners, z).0);
-            S::store_d(to.share.as_mut_ptr(), S::splat_d(share));
         }
     }
 
@@ -134,14 +126,16 @@ impl Moments {
         // SAFETY: as the caller's: no window of the row aimed at is larger, and rows and columns are held.
         unsafe {
             let sides = pair.sides::<S>(first, lanes);
+            // In registers: a load would wait for what is stored lane by lane.
+            let mut of_z = [0.0; GROUP];
             for lane in 0..GROUP {
-                let Place { corners, share } = *places.add(sides[lane] as usize);
+                let corners = *places.add(sides[lane] as usize);
                 let most = most_between::<S>(most.wrapping_add(GROUP * lane), corners);
                 S::store_d(to.most[lane].as_mut_ptr(), most);
                 let z = z.wrapping_add(lane);
-                to.z[lane] = between(corners, |corner| *z.wrapping_byte_add(corner));
-                to.share[lane] = share;
+                of_z[lane] = between(corners, |corner| *z.wrapping_byte_add(corner));
             }
+            S::store_d(to.z.as_mut_ptr(), S::load_d(of_z.as_ptr()));
         }
     }
 
@@ -318,15 +312,13 @@ impl Sums for Moments {
         let place = |side: usize| {
             let before = -((side / 2) as isize) - 1;
             let ends = [before, before + side as isize];
-            let corners = ends.map(|row| {
+            ends.map(|row| {
                 let row = frame.start(1, y.wrapping_add_signed(row));
                 ends.map(|column| row.wrapping_add_signed(column).wrapping_mul(GROUP))
-            });
-            Place { corners, share: 1.0 / (side * side) as f64 }
+            })
         };
         self.places.clear();
-        self.places.push(Place { share: 0.0, ..place(0) });
-        self.places.extend((1..=side).map(place));
+        self.places.extend((0..=side).map(place));
     }
 
     #[inline(always)]
@@ -352,6 +344,9 @@ impl Sums for Moments {
             }
             // SAFETY: as the caller's.
             unsafe {
+                let sides = S::widen(S::load(pair.row.as_ptr().add(pair.x + first)));
+                let share = S::div_d(S::splat_d(1.0), S::mul_d(sides, sides));
+                S::store_d(to.share.as_mut_ptr(), share);
                 if let Some(side) = one_side {
                     self.of_side::<S>(frame, pair.x + first, side, to);
                     continue;
