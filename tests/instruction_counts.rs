@@ -34,15 +34,15 @@ use Semantics::{Paper, Pcl};
 
 /// Instructions a pixel at most: with AVX2, with SSE2. The paper has no border policies.
 const BOUNDS: [(Semantics, Method, BorderPolicy, u64, u64); 10] = [
-    (Pcl, CovarianceMatrix, Ignore, 161, 380),
-    (Pcl, CovarianceMatrix, Mirror, 196, 425),
-    (Pcl, Average3DGradient, Ignore, 102, 189),
-    (Pcl, Average3DGradient, Mirror, 133, 227),
-    (Pcl, AverageDepthChange, Ignore, 90, 163),
-    (Pcl, AverageDepthChange, Mirror, 190, 270),
-    (Pcl, Simple3DGradient, Ignore, 107, 194),
-    (Paper, CovarianceMatrix, Ignore, 217, 469),
-    (Paper, Average3DGradient, Ignore, 163, 314),
+    (Pcl, CovarianceMatrix, Ignore, 160, 375),
+    (Pcl, CovarianceMatrix, Mirror, 196, 421),
+    (Pcl, Average3DGradient, Ignore, 99, 189),
+    (Pcl, Average3DGradient, Mirror, 130, 224),
+    (Pcl, AverageDepthChange, Ignore, 88, 160),
+    (Pcl, AverageDepthChange, Mirror, 189, 267),
+    (Pcl, Simple3DGradient, Ignore, 107, 190),
+    (Paper, CovarianceMatrix, Ignore, 216, 462),
+    (Paper, Average3DGradient, Ignore, 160, 307),
     (Paper, AverageDepthChange, Ignore, 174, 308),
 ];
 
