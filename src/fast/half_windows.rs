@@ -225,7 +225,7 @@ impl<T: Depth> Sums for HalfWindows<T> {
     }
 
     fn goes_on(&self, _limit: f32, _side: usize, _origin: [f32; 3]) -> bool {
-        T::EXACT && self.is_same_scale
+        self.is_same_scale
     }
 
     fn size(&self) -> usize {

@@ -344,6 +344,7 @@ impl Sums for Moments {
             }
             // SAFETY: as the caller's.
             unsafe {
+                // No table of shares, which mixed lanes would read one by one.
                 let sides = S::widen(S::load(pair.row.as_ptr().add(pair.x + first)));
                 let share = S::div_d(S::splat_d(1.0), S::mul_d(sides, sides));
                 S::store_d(to.share.as_mut_ptr(), share);

@@ -63,8 +63,7 @@ impl Frame {
         Frame::new(0..(GROUP + columns + side + 2).min(width), 0..0, side.min(height))
     }
 
-    /// Whether the rows of another frame, all of which are in its rings, are followed by this one's, and those of these that
-    /// it has are held, in the same places.
+    /// Whether the rings hold this frame's first rows, in the same places, after the rows of another one, `above`.
     pub fn goes_on(&self, above: &Frame) -> bool {
         (&self.columns, self.stride, self.ring) == (&above.columns, above.stride, above.ring)
             && above.rows.start <= self.rows.start

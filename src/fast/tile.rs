@@ -135,7 +135,7 @@ pub(crate) trait Sums {
     /// [`Sums::LIMITED`] all coordinates, counted from the origin.
     fn start(&mut self, frame: &Frame, limit: f32, side: usize, origin: [f32; 3]);
 
-    /// Whether nothing but the rows that are held would change if this were started so, where sums are [`Sums::EXACT`].
+    /// Whether sums that are [`Sums::EXACT`] were last started as [`Sums::start`] would start them with these.
     fn goes_on(&self, _limit: f32, _side: usize, _origin: [f32; 3]) -> bool {
         false
     }
@@ -238,9 +238,9 @@ impl Tile<'_> {
             unsafe { self.write_none::<S>(sink) };
         }
         let size = (self.image.width, self.image.height);
-        // What the rings hold, if the last tile's sums can be gone on with.
+        // What the rings hold, if sums can go on from there.
         let above = mem::take(frame);
-        let is_one = self.layers.len() == 1;
+        let can_go_on = M::EXACT && self.layers.len() == 1;
         for layer in self.layers {
             let Some(origin) = self.origin(layer) else {
                 if layer.is_all() {
@@ -253,7 +253,7 @@ impl Tile<'_> {
             *frame = Frame::around(&self.columns, &self.rows, side, size);
             // Seldom is a point farther from the camera's axis than the deepest one from the camera.
             let first = if M::LIMITED { [0.0; 3] } else { origin };
-            let goes_on = is_one && frame.goes_on(&above);
+            let goes_on = can_go_on && frame.goes_on(&above);
             let goes_on = goes_on && sums.goes_on(layer.deepest, side, first);
             if !goes_on {
                 sums.start(frame, layer.deepest, side, first);
@@ -276,7 +276,7 @@ impl Tile<'_> {
                 (limit, next) = (f32::INFINITY, frame.rows.start);
             }
         }
-        if !(is_one && M::EXACT) {
+        if !can_go_on {
             *frame = Frame::default();
         }
     }
