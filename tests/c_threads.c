@@ -144,7 +144,7 @@ static int failed(const char *name, int passed) {
 }
 
 int main(int count, char **arguments) {
-  /* Before there were any others, which might be listed still. */
+  /* Before there are any others, which might be listed still. */
   const int threads = threads_of_process();
   int i, failures = 0;
   if (count != 2) return 1;
