@@ -29,6 +29,7 @@
 mod cache;
 mod capi;
 mod cloud;
+mod cores;
 mod depth_change;
 mod distance;
 mod eigen;

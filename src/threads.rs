@@ -1,12 +1,13 @@
 //! Work shared out among threads. Items are fixed by the frame, not by the number of threads, so results are too.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::Error;
+use crate::cores::Cores;
 
 /// The calling thread, and a pool of further threads that lives until another number is asked for.
 #[derive(Debug, Default)]
@@ -14,6 +15,7 @@ pub(crate) struct Workers {
     pool: Option<ThreadPool>,
     /// The pool's threads.
     threads: Vec<JoinHandle<()>>,
+    cores: Arc<Cores>,
     /// The process that has them: a fork of it has none.
     process: u32,
 }
@@ -30,9 +32,15 @@ impl Workers {
         }
         if threads > 1 && self.pool.is_none() {
             self.process = std::process::id();
-            let handles = &mut self.threads;
+            self.cores = Arc::new(Cores::of(threads - 1)?);
+            let (handles, cores) = (&mut self.threads, &self.cores);
             let pool = ThreadPoolBuilder::new().num_threads(threads - 1).spawn_handler(|thread| {
-                handles.push(std::thread::Builder::new().spawn(|| thread.run())?);
+                let cores = Arc::clone(cores);
+                let work = move || {
+                    cores.join();
+                    thread.run();
+                };
+                handles.push(std::thread::Builder::new().spawn(work)?);
                 Ok(())
             });
             match pool.build() {
@@ -42,6 +50,9 @@ impl Workers {
                     return Err(Error::Threads);
                 }
             }
+        }
+        if self.pool.is_some() {
+            self.cores.give(threads);
         }
         Ok(())
     }
@@ -147,6 +158,42 @@ mod tests {
                 assert!(worker < count);
                 barrier.wait();
             });
+        }
+    }
+
+    /// Those of the calling thread, but for its own one if there are enough.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn workers_keep_off_the_core_of_the_calling_thread() {
+        use rustix::thread::{CpuSet, sched_getaffinity, sched_getcpu};
+        let all = sched_getaffinity(None).unwrap();
+        let of_worker = |workers: &Workers, asked: usize| {
+            let (barrier, found) = (Barrier::new(asked), Mutex::new(CpuSet::new()));
+            workers.for_each(asked, |worker, _| {
+                barrier.wait();
+                if worker > 0 {
+                    *found.lock().unwrap() = sched_getaffinity(None).unwrap();
+                }
+            });
+            found.into_inner().unwrap()
+        };
+        for asked in [2, 3, CpuSet::MAX_CPU.min(all.count() as usize + 1)] {
+            let mut workers = Workers::default();
+            workers.prepare(asked).unwrap();
+            // All have joined.
+            of_worker(&workers, asked);
+            // The calling thread may be moved to another core meanwhile, but not always.
+            let found = (0..1000).any(|_| {
+                let here = sched_getcpu();
+                workers.prepare(asked).unwrap();
+                let stayed = sched_getcpu() == here;
+                let mut expected = all;
+                if asked <= all.count() as usize {
+                    expected.unset(here);
+                }
+                stayed && of_worker(&workers, asked) == expected
+            });
+            assert!(found, "{asked} of {all:?}");
         }
     }
 }
