@@ -13,7 +13,7 @@ mod linux {
     use crate::Error;
 
     /// Some workers' cores.
-    #[derive(Debug, Default)]
+    #[derive(Debug)]
     pub(crate) struct Cores(Mutex<Given>);
 
     #[derive(Debug, Default)]
@@ -63,7 +63,7 @@ mod linux {
 mod elsewhere {
     use crate::Error;
 
-    #[derive(Debug, Default)]
+    #[derive(Debug)]
     pub(crate) struct Cores;
 
     impl Cores {

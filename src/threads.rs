@@ -15,7 +15,8 @@ pub(crate) struct Workers {
     pool: Option<ThreadPool>,
     /// The pool's threads.
     threads: Vec<JoinHandle<()>>,
-    cores: Arc<Cores>,
+    /// Where these run.
+    cores: Option<Arc<Cores>>,
     /// The process that has them: a fork of it has none.
     process: u32,
 }
@@ -32,10 +33,10 @@ impl Workers {
         }
         if threads > 1 && self.pool.is_none() {
             self.process = std::process::id();
-            self.cores = Arc::new(Cores::of(threads - 1)?);
-            let (handles, cores) = (&mut self.threads, &self.cores);
+            let cores = Arc::new(Cores::of(threads - 1)?);
+            let handles = &mut self.threads;
             let pool = ThreadPoolBuilder::new().num_threads(threads - 1).spawn_handler(|thread| {
-                let cores = Arc::clone(cores);
+                let cores = Arc::clone(&cores);
                 let work = move || {
                     cores.join();
                     thread.run();
@@ -44,21 +45,22 @@ impl Workers {
                 Ok(())
             });
             match pool.build() {
-                Ok(pool) => self.pool = Some(pool),
+                Ok(pool) => (self.pool, self.cores) = (Some(pool), Some(cores)),
                 Err(_) => {
                     self.end();
                     return Err(Error::Threads);
                 }
             }
         }
-        if self.pool.is_some() {
-            self.cores.give(threads);
+        if let Some(cores) = &self.cores {
+            cores.give(threads);
         }
         Ok(())
     }
 
     /// Ends the threads, and waits for that: their code may be unloaded next.
     fn end(&mut self) {
+        self.cores = None;
         if self.process != std::process::id() {
             // In a fork the pool is not dropped: that takes locks which one of the parent's threads may have held.
             std::mem::forget(self.pool.take());
