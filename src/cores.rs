@@ -14,45 +14,50 @@ mod linux {
 
     /// Some workers' cores.
     #[derive(Debug)]
-    pub(crate) struct Cores(Mutex<Given>);
+    pub(crate) struct Cores(Mutex<Vec<Worker>>);
 
-    #[derive(Debug, Default)]
-    struct Given {
-        workers: Vec<Pid>,
-        /// Those that all of them were last given.
-        cores: Option<CpuSet>,
+    #[derive(Debug)]
+    struct Worker {
+        id: Pid,
+        /// Those that it was started with, or has been given by others since.
+        own: CpuSet,
+        /// Those of them that it was last left.
+        left: CpuSet,
     }
 
     impl Cores {
         /// Of so many workers, none of which has joined.
         pub fn of(workers: usize) -> Result<Self, Error> {
-            let mut given = Given::default();
-            given.workers.try_reserve_exact(workers)?;
-            Ok(Cores(Mutex::new(given)))
+            let mut joined = Vec::new();
+            joined.try_reserve_exact(workers)?;
+            Ok(Cores(Mutex::new(joined)))
         }
 
         /// Joins the calling thread to the workers.
         pub fn join(&self) {
-            let mut given = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            given.workers.push(gettid());
-            given.cores = None;
+            // Where this is forbidden, workers run where they do.
+            let Ok(own) = sched_getaffinity(None) else { return };
+            let mut workers = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            workers.push(Worker { id: gettid(), own, left: own });
         }
 
-        /// Lets the workers run where the calling thread may, but not on the core that it is on, unless there are fewer
-        /// cores than `threads`, of which it is one.
-        pub fn give(&self, threads: usize) {
-            // Where any of this is forbidden, workers run where they do.
-            let Ok(mut cores) = sched_getaffinity(None) else { return };
+        /// Keeps the workers off the core that the calling thread is on, if they may run on as many cores as there are
+        /// `threads`, of which it is one.
+        pub fn keep_off_this_one(&self, threads: usize) {
             let here = sched_getcpu();
-            if here < CpuSet::MAX_CPU && threads <= cores.count() as usize {
-                cores.unset(here);
-            }
-            let mut given = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            if given.cores != Some(cores) {
-                for worker in &given.workers {
-                    let _ = sched_setaffinity(Some(*worker), &cores);
+            let mut workers = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            for worker in workers.iter_mut() {
+                let Ok(now) = sched_getaffinity(Some(worker.id)) else { continue };
+                if now != worker.left {
+                    worker.own = now;
                 }
-                given.cores = Some(cores);
+                let mut left = worker.own;
+                if here < CpuSet::MAX_CPU && threads <= left.count() as usize {
+                    left.unset(here);
+                }
+                if left == now || sched_setaffinity(Some(worker.id), &left).is_ok() {
+                    worker.left = left;
+                }
             }
         }
     }
@@ -73,7 +78,7 @@ mod elsewhere {
 
         pub fn join(&self) {}
 
-        pub fn give(&self, _threads: usize) {}
+        pub fn keep_off_this_one(&self, _threads: usize) {}
     }
 }
 

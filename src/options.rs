@@ -192,8 +192,8 @@ pub struct Options {
     /// The point the normals are turned towards, in the cloud's coordinates; default the origin.
     pub viewpoint: [f32; 3],
     /// Worker threads: 1 (the default) computes on the calling thread, 0 takes one per processor; at most 1024.
-    /// The result does not depend on it, bit for bit. On Linux they run where the calling thread may run, but for the core
-    /// that it is on, if there are as many cores as threads.
+    /// The result does not depend on it, bit for bit. On Linux they keep off the core that the calling thread is on, if they
+    /// may run on as many cores as there are threads.
     pub threads: usize,
     /// Whose windows and sums; default [`Semantics::Pcl`].
     pub semantics: Semantics,

@@ -53,7 +53,7 @@ impl Workers {
             }
         }
         if let Some(cores) = &self.cores {
-            cores.give(threads);
+            cores.keep_off_this_one(threads);
         }
         Ok(())
     }
@@ -163,39 +163,48 @@ mod tests {
         }
     }
 
-    /// Those of the calling thread, but for its own one if there are enough.
+    /// If there are enough; and others may put them elsewhere.
     #[cfg(target_os = "linux")]
     #[test]
     fn workers_keep_off_the_core_of_the_calling_thread() {
-        use rustix::thread::{CpuSet, sched_getaffinity, sched_getcpu};
+        use rustix::thread::{CpuSet, sched_getaffinity, sched_getcpu, sched_setaffinity};
         let all = sched_getaffinity(None).unwrap();
-        let of_worker = |workers: &Workers, asked: usize| {
-            let (barrier, found) = (Barrier::new(asked), Mutex::new(CpuSet::new()));
-            workers.for_each(asked, |worker, _| {
+        let on_each = |workers: &Workers, work: &(dyn Fn() + Sync)| {
+            let barrier = Barrier::new(workers.count());
+            workers.for_each(workers.count(), |worker, _| {
                 barrier.wait();
                 if worker > 0 {
-                    *found.lock().unwrap() = sched_getaffinity(None).unwrap();
+                    work();
                 }
             });
+        };
+        let cores_of = |workers: &Workers| {
+            let found = Mutex::new(CpuSet::new());
+            on_each(workers, &|| *found.lock().unwrap() = sched_getaffinity(None).unwrap());
             found.into_inner().unwrap()
         };
-        for asked in [2, 3, CpuSet::MAX_CPU.min(all.count() as usize + 1)] {
+        for asked in [2, 3, all.count() as usize + 1] {
             let mut workers = Workers::default();
             workers.prepare(asked).unwrap();
             // All have joined.
-            of_worker(&workers, asked);
+            on_each(&workers, &|| ());
             // The calling thread may be moved to another core meanwhile, but not always.
             let found = (0..1000).any(|_| {
                 let here = sched_getcpu();
                 workers.prepare(asked).unwrap();
-                let stayed = sched_getcpu() == here;
+                let has_stayed = sched_getcpu() == here;
                 let mut expected = all;
                 if asked <= all.count() as usize {
                     expected.unset(here);
                 }
-                stayed && of_worker(&workers, asked) == expected
+                has_stayed && cores_of(&workers) == expected
             });
             assert!(found, "{asked} of {all:?}");
+            let mut one = CpuSet::new();
+            one.set((0..CpuSet::MAX_CPU).find(|core| all.is_set(*core)).unwrap());
+            on_each(&workers, &|| sched_setaffinity(None, &one).unwrap());
+            workers.prepare(asked).unwrap();
+            assert_eq!(cores_of(&workers), one, "{asked} where others put them");
         }
     }
 }

@@ -175,8 +175,8 @@ pub unsafe extern "C" fn iine_estimator_set_viewpoint(
 /// Sets the number of threads: 1 (the default) computes on the calling thread, 0 takes one per processor. The result
 /// does not depend on it, bit for bit. They are started by the next computation, and live until another number is asked
 /// for, the scratch memory is released or the estimator is freed; a fork of the process starts its own with its next
-/// computation. Where memory for starting them is missing, the process may be aborted. On Linux they run where the calling
-/// thread may run, but for the core that it is on, if there are as many cores as threads.
+/// computation. Where memory for starting them is missing, the process may be aborted. On Linux they keep off the core that
+/// the calling thread is on, if they may run on as many cores as there are threads.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE above 1024.
 ///
