@@ -556,9 +556,10 @@ impl Group<'_> {
                 columns[lane] = self.blocks[lane] * BLOCK;
             }
             let (blocks, exact) = (self.blocks.len(), found.is_exact());
-            let pixels = rows.pixels(self.even, self.row, &columns, blocks, exact);
+            let mut pixels = MaybeUninit::uninit();
+            let pixels = rows.pixels(self.even, self.row, (&columns, blocks), exact, &mut pixels);
             let mut first = pixels[MIDDLE * BLOCK + MIDDLE];
-            for other in &pixels {
+            for other in pixels {
                 first.take(S::and_not(first.there.0, other.there.0), other);
             }
             let (first_best, first_windows) = found.best(&first);
@@ -835,20 +836,20 @@ impl Rows {
         }
     }
 
-    /// The pixels of some blocks, at most as many as there are lanes, whose first columns are these, in a `row` of blocks:
-    /// lanes without one take no window. Pixels of the mask `exact` count alone.
+    /// The pixels of so many blocks, at most one for each lane, whose first columns are these, in a `row` of blocks: lanes
+    /// without one take no window. Pixels of the mask `exact` count alone. They are written in place, as there are kilobytes.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn pixels<S: Along>(
+    unsafe fn pixels<'p, S: Along>(
         &self,
         even: &EvenWindows,
         row: usize,
-        columns: &[usize; LANES],
-        blocks: usize,
+        (columns, blocks): (&[usize; LANES], usize),
         exact: S::F,
-    ) -> [Pixels<S>; BLOCK * BLOCK] {
+        pixels: &'p mut MaybeUninit<[Pixels<S>; BLOCK * BLOCK]>,
+    ) -> &'p [Pixels<S>; BLOCK * BLOCK] {
         let &EvenWindows { cloud, options, .. } = even;
         let (width, height) = (cloud.width, cloud.height);
         assert!(columns.iter().all(|column| *column < width) && width + BLOCK < self.length);
@@ -856,7 +857,6 @@ impl Rows {
         unsafe {
             let there = S::mask((1 << blocks) - 1);
             let (none, one) = (S::splat(f32::NAN), S::splat(1.0));
-            let mut pixels = MaybeUninit::<[Pixels<S>; BLOCK * BLOCK]>::uninit();
             let to = pixels.as_mut_ptr().cast::<Pixels<S>>();
             for line in 0..BLOCK {
                 let depths = self.four::<S>(&self.depths, line, columns);
@@ -889,7 +889,7 @@ impl Rows {
                     });
                 }
             }
-            pixels.assume_init()
+            pixels.assume_init_ref()
         }
     }
 
