@@ -797,12 +797,10 @@ impl Rows {
                 self.depths[line * length..][..length].fill(f32::NAN);
                 continue;
             }
-            let pixels = y * width..(y + 1) * width;
-            let to = &mut self.depths[line * length + 1..][..width];
-            to.copy_from_slice(&cloud.depths[pixels]);
+            let depths = &cloud.depths[y * width..][..width];
             // SAFETY: as the caller's.
             unsafe {
-                keep::<S>(to, concerned.row(y));
+                keep::<S>(depths, concerned.row(y), &mut self.depths[line * length + 1..]);
                 self.find_means::<S>(line, asked.clean.spoilt.row(y));
             }
         }
@@ -936,23 +934,24 @@ unsafe fn four_points<S: Along>(
     }
 }
 
-/// Keeps the depths of a row that are marked; the others become NaN.
+/// The depths of a row that are marked, for as many elements from the first one on; NaN for the others.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn keep<S: Simd>(depths: &mut [f32], marks: &[u64]) {
+unsafe fn keep<S: Simd>(depths: &[f32], marks: &[u64], to: &mut [f32]) {
     let whole = depths.len() / S::LANES * S::LANES;
     for x in (0..whole).step_by(S::LANES) {
-        let depths = depths[x..][..S::LANES].as_mut_ptr();
         // SAFETY: as the caller's; so many elements are there.
         unsafe {
             let kept = S::mask(marks_from(marks, x) as u32 & all(S::LANES));
-            S::store(depths, S::select(kept, S::load(depths), S::splat(f32::NAN)));
+            let depths = S::load(depths[x..][..S::LANES].as_ptr());
+            let to = to[x..][..S::LANES].as_mut_ptr();
+            S::store(to, S::select(kept, depths, S::splat(f32::NAN)));
         }
     }
     for x in whole..depths.len() {
-        depths[x] = if marks_from(marks, x) & 1 != 0 { depths[x] } else { f32::NAN };
+        to[x] = if marks_from(marks, x) & 1 != 0 { depths[x] } else { f32::NAN };
     }
 }
 
