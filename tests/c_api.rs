@@ -21,10 +21,14 @@ fn compiler() -> cc::Tool {
     cc::Build::new().cargo_metadata(false).opt_level(1).target(&target).host(host).get_compiler()
 }
 
-/// Runs a program built for this test's platform, through cargo's runner if there is one.
-fn run(program: &Path, arguments: &[PathBuf], library_dir: &Path) {
+/// Cargo's runner for this test's platform, if there is one.
+fn runner() -> String {
     let runner = format!("CARGO_TARGET_{}_UNKNOWN_LINUX_GNU_RUNNER", std::env::consts::ARCH);
-    let runner = std::env::var(runner.to_uppercase()).unwrap_or_default();
+    std::env::var(runner.to_uppercase()).unwrap_or_default()
+}
+
+/// Runs a program built for this test's platform, through a runner if that is one.
+fn run(runner: &str, program: &Path, arguments: &[PathBuf], library_dir: &Path) {
     let mut words = runner.split_whitespace().map(PathBuf::from).chain([program.to_owned()]);
     let mut command = Command::new(words.next().expect("at least the program"));
     check(command.args(words).args(arguments).env("LD_LIBRARY_PATH", library_dir));
@@ -75,7 +79,7 @@ fn compile(
 /// Compiles `tests/c_api.c` as `language`, links it as `link` says, and runs it.
 fn compile_and_run(name: &str, language: &[&str], link: impl FnOnce(&mut Command, &Path)) {
     let directory = directory(name);
-    run(&compile("c_api.c", &directory, language, link), &[], &directory);
+    run(&runner(), &compile("c_api.c", &directory, language, link), &[], &directory);
 }
 
 /// Links the shared library under the name that its SONAME asks the loader for.
@@ -107,11 +111,30 @@ fn cpp_with_the_shared_library() {
     compile_and_run("cpp-shared", &CPP, shared);
 }
 
-#[test]
-fn threads_where_the_library_is_unloaded_or_the_process_forked() {
-    let directory = directory("threads");
+/// Compiles `tests/c_threads.c`, and runs it.
+fn run_threads(name: &str, runner: &str) {
+    let directory = directory(name);
     let program = compile("c_threads.c", &directory, &C99, |command, _| {
         command.args(["-ldl", "-lpthread"]);
     });
-    run(&program, &[library("libiine.so")], &directory);
+    run(runner, &program, &[library("libiine.so")], &directory);
+}
+
+#[test]
+fn threads_where_the_library_is_unloaded_or_the_process_forked() {
+    run_threads("threads", &runner());
+}
+
+/// Users look for defects of their programs so; there is no vDSO then.
+#[test]
+fn threads_under_valgrind() {
+    // It runs this machine's programs only.
+    if !runner().is_empty() {
+        return;
+    }
+    if Command::new("valgrind").arg("--version").output().is_err() {
+        println!("skipped: threads_under_valgrind: no valgrind");
+        return;
+    }
+    run_threads("threads-valgrind", "valgrind --quiet --error-exitcode=9");
 }
