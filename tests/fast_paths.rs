@@ -7,7 +7,7 @@ use clouds::{
     Cloud, Kind, ODD, Random, angle, assert_same_bits, compute, compute_listed, edge_options,
     fast_isas, fuses, methods, normal, options, paper_options, random_options,
 };
-use iine::{BorderPolicy, Estimator, Isa, Method, Normals, Options, Points, Semantics};
+use iine::{BorderPolicy, Depth, Estimator, Isa, Method, Normals, Options, Points, Semantics};
 
 const SMOOTHING: [f32; 6] = [3.0, 5.0, 7.0, 10.0, 20.0, 40.0];
 
@@ -302,6 +302,50 @@ fn depths_orders_of_magnitude_apart_equal_the_plain_form() {
             let listed = compute_listed(&mut estimator, cloud, &indices);
             let expected: Vec<_> = indices.iter().map(|index| all[*index as usize]).collect();
             assert_same_bits(&expected, &listed, listed.len(), &format!("indices, {what}"));
+        }
+    }
+    println!("{worst:?}");
+}
+
+/// Markers for "no return" here and there, which with so large a gamma are on the surfaces around them: a window's points
+/// are then far apart along the line of sight.
+#[test]
+fn windows_with_far_markers_equal_the_plain_form() {
+    let mut worst = Worst::default();
+    let (width, height) = (31, 30);
+    for seed in 0..200 {
+        let mut random = Random::new(seed);
+        let slope = [(); 2].map(|()| random.between(-0.5, 0.5));
+        let [first, last] = [width, height].map(|end| random.below(end));
+        let size = 1 + random.below(8);
+        let is_marked = |x: usize, y: usize| {
+            (first..first + size).contains(&x) && (last..last + size).contains(&y)
+        };
+        let depth_only = random.below(2) == 0;
+        let one_in = random.pick(&[1000, 200, 50, 10]);
+        let noise = random.pick(&[0.0, 0.1]);
+        let point = |at: usize| {
+            let (x, y) = (at % width, at / width);
+            let [u, v] = [x, y].map(|at| at as f32 / 60.0 - 0.25);
+            let z = 1.0 + slope[0] * u + slope[1] * v + noise * random.between(0.0, 1.0);
+            match 65504.0 {
+                far if is_marked(x, y) || random.below(one_in) == 0 => {
+                    if depth_only {
+                        [u * z, v * z, far]
+                    } else {
+                        [far; 3]
+                    }
+                }
+                _ => [u * z, v * z, z],
+            }
+        };
+        let points = (0..width * height).map(point).collect();
+        let cloud = Cloud { width, height, points };
+        for mut options in edge_options() {
+            options.paper.gamma = 140.0;
+            options.paper.depth = random.pick(&Depth::ALL);
+            options.paper.largest_radius = 5 + random.below(20) as u32;
+            worst.check(&cloud, &format!("seed {seed}"), &options);
         }
     }
     println!("{worst:?}");

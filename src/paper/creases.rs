@@ -4,6 +4,7 @@ use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::cloud::Cloud;
 use super::summed_area::SummedArea;
 use crate::Error;
+use crate::methods::is_length;
 use crate::rect::Rect;
 use crate::threads::Workers;
 use crate::vector::{cross, dot};
@@ -34,17 +35,21 @@ impl SummedNormals {
     }
 
     /// Sums those across the mean 3-D gradients of a cloud, the blocks of which are summed, in windows of these radii around
-    /// them; 0 for none.
+    /// them; 0 for none. `alpha` is the sensor's.
     pub fn sum_gradients(
         &mut self,
         cloud: &Cloud,
+        alpha: f32,
         blocks: &Blocks,
         radius: impl Fn((usize, usize)) -> u32 + Sync,
         workers: &Workers,
     ) -> Result<(), Error> {
         let (across, down) = (blocks.across, blocks.down);
+        let farthest = FARTHEST / alpha;
         self.points.sum_up(across, down, workers, |(column, row)| {
-            cloud.sums[row * across + column].map(f64::from)
+            let sum @ [x, y, z, count] = cloud.sums[row * across + column];
+            let is_near = |value: f32| value.abs() <= farthest * count;
+            if is_near(x) && is_near(y) && is_near(z) { sum.map(f64::from) } else { [0.0; 4] }
         })?;
         let points = &self.points;
         self.normals.sum_up(across, down, workers, |block| {
@@ -64,7 +69,7 @@ impl SummedNormals {
 
     /// Whether the normals of the blocks that a rectangle of pixels touches vary strongly, or there are none. How much they
     /// vary is 1 - |mean|^2: for small angles their variance in square radians. (Rounding, beside points that are orders of
-    /// magnitude farther, makes them vary too: then all windows are looked at again.)
+    /// magnitude farther, may make them vary too: then more windows than need be are looked at again.)
     pub fn vary_in(&self, pixels: &Rect) -> bool {
         let [x, y] =
             [&pixels.x, &pixels.y].map(|range| range.start / BLOCK..range.end.div_ceil(BLOCK));
@@ -75,6 +80,10 @@ impl SummedNormals {
 
 /// In square radians: normals about 5.3 degrees from their mean.
 const STRONG_VARIATION: f64 = 0.0085;
+
+/// Blocks whose mean is so many times as far away as where a depth's smallest change (Eq. 4) is the depth itself say nothing, as
+/// markers for "no return" do not, and sums would lose what others say.
+const FARTHEST: f32 = 1000.0;
 
 /// The halves of a block: left and right, above and below.
 fn halves_of_block(cloud: &Cloud, blocks: &Blocks, block: (usize, usize)) -> [[Sum; 2]; 2] {
@@ -129,7 +138,7 @@ fn normal(halves: [[Sum; 2]; 2]) -> Option<[f64; 3]> {
     let normal = cross(v, u);
     let length2 = dot(normal, normal);
     let scale = 1.0 / length2.sqrt();
-    scale.is_finite().then(|| normal.map(|n| n * scale))
+    is_length(length2).then(|| normal.map(|n| n * scale))
 }
 
 fn minus(a: Sum, b: Sum) -> Sum {
@@ -146,15 +155,20 @@ mod tests {
     use crate::cloud::Points;
     use crate::options::{Method, Options, Semantics};
 
-    /// A cloud whose depths are a function of the column, with some points missing.
-    fn cloud(depth: impl Fn(f32) -> f32) -> Cloud {
+    /// A cloud whose depths are a function of the column, with some points missing, and above on the right two at the depth
+    /// `marker`.
+    fn cloud(marker: f32, depth: impl Fn(f32) -> f32) -> Cloud {
         let (width, height) = (90, 61);
         let method = Method::CovarianceMatrix;
         let semantics = Semantics::Paper;
         let options = Options { semantics, method, crease_windows: true, ..Options::default() };
         let point = |at: usize| {
             let [x, y] = [at % width, at / width].map(|line| 0.01 * line as f32);
-            if at % 11 == 3 { [f32::NAN; 3] } else { [x, y, depth(x)] }
+            match at {
+                70 | 71 => [x, y, marker],
+                _ if at % 11 == 3 => [f32::NAN; 3],
+                _ => [x, y, depth(x)],
+            }
         };
         let points: Vec<_> = (0..width * height).flat_map(point).collect();
         let points = Points::interleaved(&points, width, height, 3, 0).unwrap();
@@ -163,12 +177,17 @@ mod tests {
 
     #[test]
     fn gradients_vary_at_creases_only() {
-        for (bend, varies) in [(0.0, false), (0.5, true)] {
-            let cloud = cloud(|x| 2.0 + 0.3 * x + bend * (x - 0.45).abs());
+        let markers = [f32::NAN, 1e6, 1e20, f32::MAX];
+        for (marker, (bend, varies)) in
+            markers.into_iter().flat_map(|marker| [(marker, (0.0, false)), (marker, (0.5, true))])
+        {
+            let cloud = cloud(marker, |x| 2.0 + 0.3 * x + bend * (x - 0.45).abs());
             let blocks = Blocks::of(cloud.width, cloud.height);
             let mut normals = SummedNormals::default();
             for radius in [1, 2, 3, 7, 8, 20] {
-                normals.sum_gradients(&cloud, &blocks, |_| radius, &Workers::default()).unwrap();
+                normals
+                    .sum_gradients(&cloud, 0.0028, &blocks, |_| radius, &Workers::default())
+                    .unwrap();
                 let vary_in = |x| normals.vary_in(&Rect { x, y: 0..cloud.height });
                 assert_eq!(vary_in(25..65), varies, "radius {radius}");
                 assert!(!vary_in(0..20), "radius {radius}");

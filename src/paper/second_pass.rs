@@ -136,7 +136,8 @@ impl SecondPass {
         if options.crease_windows {
             let radius = |block| sample_radius(&windows.sizes, cloud, &blocks, block, options);
             if options.has_block_gradients() {
-                normals.sum_gradients(cloud, &blocks, radius, engine.workers())?;
+                let alpha = options.paper.alpha;
+                normals.sum_gradients(cloud, alpha, &blocks, radius, engine.workers())?;
             } else {
                 refill(radii, (0..blocks.count()).map(|block| radius(blocks.place(block))))?;
                 engine.of_blocks(&blocks, radii, &mut windows.of_even)?;

@@ -396,7 +396,10 @@ impl EvenTile<'_> {
             let largest = unevenness * scale + of_deviation;
             let is_none = (Doubles::splat(4.0) * largest).lt(least * scale);
             let of_trace = Doubles::splat(8.0 * error) * share * length2;
-            let of_seen = of_trace * half_trace.max(of_trace);
+            // The adjugate loses where points are far apart along the line of sight.
+            let of_adjugate = trace * length2;
+            let of_adjugate = Doubles::splat(ROUNDING) * of_adjugate * of_adjugate;
+            let of_seen = of_trace * half_trace.max(of_trace) + of_adjugate;
             let enough_seen = Doubles::splat(8.0) * of_seen;
             let deep = Doubles::splat(Plane::DEEP) * length2 * length2;
             let is_deep = deep.lt(along);
