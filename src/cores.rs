@@ -1,4 +1,4 @@
-//! The cores that worker threads may run on while something is computed.
+//! The cores that worker threads may run on.
 //!
 //! A scheduler may wake a worker on the core of the thread that wakes it though another one is idle. There it waits, and the
 //! frame takes as long as with one thread: on machines of two cores Linux does so in most frames, if there is a pause
@@ -45,29 +45,16 @@ mod linux {
         /// `threads`, of which it is one.
         pub fn keep_off_this_one(&self, threads: usize) {
             let here = sched_getcpu();
-            self.leave(|own| {
-                let mut left = *own;
-                if here < CpuSet::MAX_CPU && threads <= own.count() as usize {
-                    left.unset(here);
-                }
-                left
-            });
-        }
-
-        /// Leaves the workers all of their cores.
-        pub fn let_go(&self) {
-            self.leave(|own| *own);
-        }
-
-        /// Leaves every worker some of its own cores.
-        fn leave(&self, some: impl Fn(&CpuSet) -> CpuSet) {
             let mut workers = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             for worker in workers.iter_mut() {
                 let Ok(now) = sched_getaffinity(Some(worker.id)) else { continue };
                 if now != worker.left {
                     worker.own = now;
                 }
-                let left = some(&worker.own);
+                let mut left = worker.own;
+                if here < CpuSet::MAX_CPU && threads <= left.count() as usize {
+                    left.unset(here);
+                }
                 if left == now || sched_setaffinity(Some(worker.id), &left).is_ok() {
                     worker.left = left;
                 }
@@ -92,8 +79,6 @@ mod elsewhere {
         pub fn join(&self) {}
 
         pub fn keep_off_this_one(&self, _threads: usize) {}
-
-        pub fn let_go(&self) {}
     }
 }
 

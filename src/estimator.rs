@@ -133,18 +133,6 @@ impl Estimator {
         indices: Option<&[i32]>,
         normals: &Normals,
     ) -> Result<(), Error> {
-        let done = self.compute_by_form(points, indices, normals);
-        self.scratch.workers().let_go();
-        done
-    }
-
-    /// As [`Estimator::compute_pixels`], plainly or fast.
-    fn compute_by_form(
-        &mut self,
-        points: &Points,
-        indices: Option<&[i32]>,
-        normals: &Normals,
-    ) -> Result<(), Error> {
         let points = &points.beside(normals);
         if !self.is_plain(points) {
             let Estimator { ref options, isa, ref mut scratch, .. } = *self;

@@ -22,7 +22,7 @@ pub(crate) struct Workers {
 }
 
 impl Workers {
-    /// Makes `threads` workers ready, until they are [let go](Workers::let_go); 0 takes one per processor.
+    /// Makes `threads` workers ready; 0 takes one per processor.
     pub fn prepare(&mut self, threads: usize) -> Result<(), Error> {
         let threads = match threads {
             0 => std::thread::available_parallelism().map_or(1, usize::from),
@@ -56,16 +56,6 @@ impl Workers {
             cores.keep_off_this_one(threads);
         }
         Ok(())
-    }
-
-    /// Lets the threads run where they may: what they were made ready for is done.
-    pub fn let_go(&self) {
-        // A fork knows its parent's threads.
-        if self.process == std::process::id()
-            && let Some(cores) = &self.cores
-        {
-            cores.let_go();
-        }
     }
 
     /// Ends the threads, and waits for that: their code may be unloaded next.
@@ -210,19 +200,11 @@ mod tests {
                 has_stayed && cores_of(&workers) == expected
             });
             assert!(found, "{asked} of {all:?}");
-            // Any of the cores: they may have been kept off all others.
-            for core in (0..CpuSet::MAX_CPU).filter(|core| all.is_set(*core)) {
-                workers.let_go();
-                assert_eq!(cores_of(&workers), all, "{asked} are let go");
-                let mut one = CpuSet::new();
-                one.set(core);
-                on_each(&workers, &|| sched_setaffinity(None, &one).unwrap());
-                workers.prepare(asked).unwrap();
-                assert_eq!(cores_of(&workers), one, "{asked} where others put them");
-                workers.let_go();
-                on_each(&workers, &|| sched_setaffinity(None, &all).unwrap());
-                workers.prepare(asked).unwrap();
-            }
+            let mut one = CpuSet::new();
+            one.set((0..CpuSet::MAX_CPU).find(|core| all.is_set(*core)).unwrap());
+            on_each(&workers, &|| sched_setaffinity(None, &one).unwrap());
+            workers.prepare(asked).unwrap();
+            assert_eq!(cores_of(&workers), one, "{asked} where others put them");
         }
     }
 }
