@@ -44,11 +44,12 @@ mod linux {
         /// Keeps the workers off the core that the calling thread is on, if they may run on as many cores as there are
         /// `threads`, of which it is one.
         pub fn keep_off_this_one(&self, threads: usize) {
-            let here = sched_getcpu();
+            let (here, mine) = (sched_getcpu(), sched_getaffinity(None).ok());
             let mut workers = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             for worker in workers.iter_mut() {
                 let Ok(now) = sched_getaffinity(Some(worker.id)) else { continue };
-                if now != worker.left {
+                // What the calling thread has too may have been given to the whole process.
+                if now != worker.left || Some(now) == mine {
                     worker.own = now;
                 }
                 let mut left = worker.own;

@@ -200,6 +200,16 @@ mod tests {
                 has_stayed && cores_of(&workers) == expected
             });
             assert!(found, "{asked} of {all:?}");
+            // As where the whole process is given just those cores.
+            let left = cores_of(&workers);
+            sched_setaffinity(None, &left).unwrap();
+            for _ in 0..2 {
+                workers.prepare(asked).unwrap();
+                let found = cores_of(&workers);
+                let is_left = |core: usize| left.is_set(core) || !found.is_set(core);
+                assert!((0..CpuSet::MAX_CPU).all(is_left), "{asked}: {found:?} of {left:?}");
+            }
+            sched_setaffinity(None, &all).unwrap();
             let mut one = CpuSet::new();
             one.set((0..CpuSet::MAX_CPU).find(|core| all.is_set(*core)).unwrap());
             on_each(&workers, &|| sched_setaffinity(None, &one).unwrap());
