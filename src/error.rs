@@ -21,7 +21,7 @@ pub enum Error {
     Stride = 4,
     /// A pointer is not aligned to its type.
     Misaligned = 5,
-    /// Output bytes overlap input bytes or other output bytes.
+    /// Output bytes overlap input bytes or other output bytes, or lie among them with other strides, so that they may.
     Overlap = 6,
     /// An option's value is outside its range, or an enum's number is unknown.
     OptionValue = 7,
@@ -61,7 +61,9 @@ impl Error {
         match self {
             Error::NullPointer => c"a required pointer is NULL",
             Error::StructSize => c"struct_size is not a known size of the struct",
-            Error::Size => c"width or height is zero, too large, or not that of the buffers",
+            Error::Size => {
+                c"width, height or count is zero or too large, or not that of the buffers"
+            }
             Error::Stride => c"a stride is not a multiple of 4 bytes or is too small",
             Error::Misaligned => c"a pointer is not aligned to its type",
             Error::Overlap => c"output bytes overlap input bytes or other output bytes",

@@ -33,7 +33,7 @@
 #define IINE_ERROR_STRUCT_SIZE 2
 
 /**
- * A width or height is zero, their product above INT32_MAX, or the buffer does not fit the address space.
+ * A width or height is zero, their product or a count above INT32_MAX, or the buffer does not fit the address space.
  */
 #define IINE_ERROR_SIZE 3
 
@@ -48,7 +48,8 @@
 #define IINE_ERROR_MISALIGNED 5
 
 /**
- * Output bytes overlap input bytes or other output bytes.
+ * Output bytes overlap input bytes or other output bytes, or lie among them with other strides, so that they may:
+ * `docs/c-api.md` says which are told apart.
  */
 #define IINE_ERROR_OVERLAP 6
 
@@ -248,7 +249,7 @@ typedef struct iine_normals {
   /**
    * Bytes from a row to the next; a multiple of 4, at least width * point_stride; 0 means just that.
    * Neither this nor `curvature_row_stride` is used by `iine_estimator_compute_indices` and
-   * `iine_estimator_compute_window`.
+   * `iine_estimator_compute_window`; the point strides must be valid there too.
    */
   size_t row_stride;
   /**
@@ -261,7 +262,8 @@ typedef struct iine_normals {
    */
   size_t curvature_point_stride;
   /**
-   * Bytes from a row of curvatures to the next; 0 means width * curvature_point_stride.
+   * Bytes from a row of curvatures to the next; a multiple of 4, at least width * curvature_point_stride; 0 means just
+   * that.
    */
   size_t curvature_row_stride;
 } iine_normals;
@@ -464,7 +466,7 @@ int32_t iine_estimator_set_border_policy(struct iine_estimator *estimator, int32
 /**
  * Sets the smoothing size in pixels: finite, above 0; default 10. The side of a pixel's window is
  * min(distance to the nearest depth change, smoothing size) rounded down; where that minimum is not above 2 there is no
- * normal, so that sizes up to 2 give none.
+ * normal. Depth-dependent smoothing adds to the size; without it, sizes up to 2 give no normals.
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
  *

@@ -88,7 +88,7 @@ pub unsafe extern "C" fn iine_estimator_set_border_policy(
 
 /// Sets the smoothing size in pixels: finite, above 0; default 10. The side of a pixel's window is
 /// min(distance to the nearest depth change, smoothing size) rounded down; where that minimum is not above 2 there is no
-/// normal, so that sizes up to 2 give none.
+/// normal. Depth-dependent smoothing adds to the size; without it, sizes up to 2 give no normals.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
 ///

@@ -26,13 +26,14 @@ pub const IINE_OK: i32 = 0;
 pub const IINE_ERROR_NULL_POINTER: i32 = 1;
 /// A struct's `struct_size` is not one that this library's version or an earlier one defines.
 pub const IINE_ERROR_STRUCT_SIZE: i32 = 2;
-/// A width or height is zero, their product above INT32_MAX, or the buffer does not fit the address space.
+/// A width or height is zero, their product or a count above INT32_MAX, or the buffer does not fit the address space.
 pub const IINE_ERROR_SIZE: i32 = 3;
 /// A stride is not a multiple of 4 bytes, or too small for what it steps over.
 pub const IINE_ERROR_STRIDE: i32 = 4;
 /// A pointer is not aligned to its type.
 pub const IINE_ERROR_MISALIGNED: i32 = 5;
-/// Output bytes overlap input bytes or other output bytes.
+/// Output bytes overlap input bytes or other output bytes, or lie among them with other strides, so that they may:
+/// `docs/c-api.md` says which are told apart.
 pub const IINE_ERROR_OVERLAP: i32 = 6;
 /// An option's value is outside its range, or an enum's number is unknown.
 pub const IINE_ERROR_OPTION_VALUE: i32 = 7;

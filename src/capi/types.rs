@@ -107,14 +107,15 @@ pub struct iine_normals {
     pub point_stride: usize,
     /// Bytes from a row to the next; a multiple of 4, at least width * point_stride; 0 means just that.
     /// Neither this nor `curvature_row_stride` is used by `iine_estimator_compute_indices` and
-    /// `iine_estimator_compute_window`.
+    /// `iine_estimator_compute_window`; the point strides must be valid there too.
     pub row_stride: usize,
     /// The first pixel's curvature (smallest eigenvalue over the trace, 0 to 1/3), or NULL for none.
     /// NaN for the methods that give none.
     pub curvature: *mut f32,
     /// Bytes from a pixel's curvature to the next; a multiple of 4, at least 4.
     pub curvature_point_stride: usize,
-    /// Bytes from a row of curvatures to the next; 0 means width * curvature_point_stride.
+    /// Bytes from a row of curvatures to the next; a multiple of 4, at least width * curvature_point_stride; 0 means just
+    /// that.
     pub curvature_row_stride: usize,
 }
 

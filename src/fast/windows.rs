@@ -491,7 +491,7 @@ impl Sweep {
         let segment = order.segment;
         let z = &self.z[Self::z_place(order, y)];
         let (distances, sides) = (&row[1..=segment], &mut self.sides[..segment]);
-        // SAFETY: as the caller's; the sides fit i32.
+        // SAFETY: as the caller's.
         let largest = unsafe {
             let mut so_far = S::splat(0.0);
             if let Some(smoothing) = smoothing {
@@ -532,7 +532,7 @@ impl Sweep {
 /// `smoothing_area::window_side`, with nothing ignored.
 ///
 /// # Safety
-/// The processor has the instruction set of `S`; the sides fit i32.
+/// The processor has the instruction set of `S`.
 #[inline(always)]
 unsafe fn side<S: Simd>(distance: S::F, smoothing: S::F) -> S::F {
     // SAFETY: as the caller's.

@@ -120,7 +120,7 @@ pub(crate) trait Simd: Copy {
     unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I;
     /// Nearest integers, ties to even; the value must fit.
     unsafe fn round_i(a: Self::F) -> Self::I;
-    /// Integers towards zero; the value must fit.
+    /// Integers towards zero; of what does not fit, NaN too, any number.
     unsafe fn truncate_i(a: Self::F) -> Self::I;
     unsafe fn float_i(a: Self::I) -> Self::F;
 
@@ -180,7 +180,7 @@ pub(crate) trait Simd: Copy {
         unsafe { Self::lt(Self::abs(a), Self::splat(f32::INFINITY)) }
     }
 
-    /// Whole numbers towards zero; the value must fit i32.
+    /// Whole numbers towards zero; of what is none of i32, NaN too, any number.
     #[inline(always)]
     unsafe fn truncate(a: Self::F) -> Self::F {
         // SAFETY: as the caller's.

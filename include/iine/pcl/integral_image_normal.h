@@ -43,7 +43,7 @@ namespace iine
     *
     * \tparam PointInT a point type with float x, y, z
     * \tparam PointOutT a point type with float normal_x, normal_y, normal_z, curvature; its other fields stay as
-    * they are. The output may be the input cloud itself.
+    * they are. The output may be the input cloud itself, but not with indices, to which it is cut before it is read.
     */
   template <typename PointInT, typename PointOutT>
   class IntegralImageNormalEstimation : public pcl::Feature<PointInT, PointOutT>
@@ -150,7 +150,7 @@ namespace iine
       computePointNormal (const int pos_x, const int pos_y, const unsigned point_index, PointOutT &normal)
       {
         static_cast<void> (point_index);
-        computeWindow (BORDER_POLICY_IGNORE, pos_x, pos_y, normal);
+        computeWindow ("computePointNormal", BORDER_POLICY_IGNORE, pos_x, pos_y, normal);
       }
 
       /** \brief As \ref computePointNormal, with the window folded back at the border of the image.
@@ -164,7 +164,7 @@ namespace iine
       computePointNormalMirror (const int pos_x, const int pos_y, const unsigned point_index, PointOutT &normal)
       {
         static_cast<void> (point_index);
-        computeWindow (BORDER_POLICY_MIRROR, pos_x, pos_y, normal);
+        computeWindow ("computePointNormalMirror", BORDER_POLICY_MIRROR, pos_x, pos_y, normal);
       }
 
       /** \brief Set the factor f of the depth change threshold: neighbours whose z differ by more than
@@ -180,7 +180,7 @@ namespace iine
 
       /** \brief Set the side of the largest window without depth-dependent smoothing. A pixel's window has the side
         * min (distance to the nearest depth change, this), rounded down; where that minimum is not above 2 there is no
-        * normal, so that sizes up to 2 give none.
+        * normal. \ref setDepthDependentSmoothing adds to the size; without it, sizes up to 2 give no normals.
         * \param[in] normal_smoothing_size the side in pixels, finite and above 0; anything else is refused with a
         * printed error
         */
@@ -241,8 +241,8 @@ namespace iine
         *
         * It is computed by the first call after a compute, from the cloud as it is then. Without any depth change in the
         * image it is width + height, with SEMANTICS_PAPER infinity.
-        * \return width * height values, row by row, valid until the next \ref setInputCloud or compute; null if there
-        * has been no successful compute since \ref setInputCloud
+        * \return width * height values, row by row, valid until the next \ref setInputCloud or compute; null unless
+        * there was a compute since \ref setInputCloud, and the last one succeeded
         */
       float *
       getDistanceMap ()
@@ -265,8 +265,8 @@ namespace iine
         * \param[out] map width * height values, row by row: 1 at a depth change, else 0. With SEMANTICS_PCL both pixels of a
         * change are marked, and those at and beside a z that is not finite; with SEMANTICS_PAPER the pixel before the change
         * (Eq. 7), and missing points are none
-        * \return whether it was computed; if not (there has been no successful compute since \ref setInputCloud),
-        * the map is empty and an error is printed
+        * \return whether it was computed; if not (unless there was a compute since \ref setInputCloud, and the last one
+        * succeeded), the map is empty and an error is printed
         */
       bool
       getDepthChangeMap (std::vector<std::uint8_t> &map)
@@ -488,7 +488,8 @@ namespace iine
 
       /** \brief Get the outcome of the last compute, \ref computePointNormal or \ref computePointNormalMirror. Not in
         * PCL's class.
-        * \return IINE_OK (0), or one of IINE_ERROR_*, whose text iine_status_string gives
+        * \return IINE_OK (0), or one of IINE_ERROR_*, whose text iine_status_string gives; IINE_ERROR_SIZE for a cloud that
+        * is not organized
         */
       int
       getLastStatus () const
@@ -772,7 +773,7 @@ namespace iine
       }
 
       void
-      computeWindow (BorderPolicy border_policy, int pos_x, int pos_y, PointOutT &normal)
+      computeWindow (const char *member, BorderPolicy border_policy, int pos_x, int pos_y, PointOutT &normal)
       {
         last_status_ = checkInput ();
         Options options = options_;
@@ -792,7 +793,7 @@ namespace iine
           return;
         clearNormal (normal);
         throwIfUnsupported (last_status_);
-        report ("computePointNormal", last_status_);
+        report (member, last_status_);
       }
 
       /** \brief Compute one of the maps from the cloud as it is and the options of the last compute.
@@ -809,7 +810,8 @@ namespace iine
         map.clear ();
         if (!has_maps_)
         {
-          PCL_ERROR ("[iine::%s::%s] Nothing has been computed yet.\n", feature_name_.c_str (), member);
+          PCL_ERROR ("[iine::%s::%s] Nothing has been computed from this cloud, or the last compute failed.\n",
+                     feature_name_.c_str (), member);
           return (false);
         }
         int status = checkInput ();
@@ -843,7 +845,9 @@ namespace iine
       throwIfUnsupported (int status) const
       {
         if (status == IINE_ERROR_UNSUPPORTED && options_.semantics == SEMANTICS_PCL)
-          PCL_THROW_EXCEPTION (pcl::PCLException, iine_status_string (status));
+          PCL_THROW_EXCEPTION (pcl::PCLException,
+                               "[iine::IntegralImageNormalEstimation] SIMPLE_3D_GRADIENT does not support "
+                               "BORDER_POLICY_MIRROR.");
       }
 
       void
