@@ -611,13 +611,12 @@ mod tests {
     #[test]
     fn fields_that_share_a_byte_collide() {
         let grids: Vec<_> = (0..108)
-            .map(|i| {
+            .flat_map(|i| {
                 let (width, height, floats) = (1 + i % 3, 1 + i / 3 % 3, [1, 2, 3][i / 9 % 3]);
                 // Packed rows, and others; those of the last kind are alike for many grids.
                 let row_stride = [0, 5 * FIELD, 6 * FIELD, 9 * FIELD][i / 27];
                 Grid::new(width, height, floats * FIELD, row_stride)
             })
-            .flatten()
             .collect();
         let addresses = |grid: &Grid, from: usize| {
             let rows = (0..grid.height).map(|y| grid.offset(0, y));

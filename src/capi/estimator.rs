@@ -99,9 +99,7 @@ pub unsafe extern "C" fn iine_estimator_compute(
 ) -> i32 {
     guard(|| {
         // SAFETY: promised by the caller.
-        let estimator = &mut unsafe { reference_mut(estimator) }?.estimator;
-        // SAFETY: promised by the caller.
-        let points = unsafe { read_points(points) }?;
+        let (estimator, points) = unsafe { read_request(estimator, points) }?;
         // SAFETY: promised by the caller.
         let mut normals = unsafe { read_normals(normals, points.width(), points.height(), false) }?;
         estimator.compute(&points, &mut normals)
@@ -128,9 +126,7 @@ pub unsafe extern "C" fn iine_estimator_compute_indices(
 ) -> i32 {
     guard(|| {
         // SAFETY: promised by the caller.
-        let estimator = &mut unsafe { reference_mut(estimator) }?.estimator;
-        // SAFETY: promised by the caller.
-        let points = unsafe { read_points(points) }?;
+        let (estimator, points) = unsafe { read_request(estimator, points) }?;
         if count == 0 {
             return Ok(());
         }
@@ -175,9 +171,7 @@ pub unsafe extern "C" fn iine_estimator_compute_window(
 ) -> i32 {
     guard(|| {
         // SAFETY: promised by the caller.
-        let estimator = &mut unsafe { reference_mut(estimator) }?.estimator;
-        // SAFETY: promised by the caller.
-        let points = unsafe { read_points(points) }?;
+        let (estimator, points) = unsafe { read_request(estimator, points) }?;
         // SAFETY: promised by the caller.
         let mut normal = unsafe { read_normals(normal, 1, 1, true) }?;
         let size = |size| u32::try_from(size).map_err(|_| Error::OptionValue);
@@ -207,9 +201,7 @@ pub unsafe extern "C" fn iine_estimator_compute_maps(
 ) -> i32 {
     guard(|| {
         // SAFETY: promised by the caller.
-        let estimator = &mut unsafe { reference_mut(estimator) }?.estimator;
-        // SAFETY: promised by the caller.
-        let points = unsafe { read_points(points) }?;
+        let (estimator, points) = unsafe { read_request(estimator, points) }?;
         // SAFETY: promised by the caller.
         let maps = unsafe { read_sized(maps, &iine_maps::SIZES) }?;
         let pixels = points.width() * points.height();
@@ -226,6 +218,18 @@ pub unsafe extern "C" fn iine_estimator_compute_maps(
         };
         estimator.compute_maps(&points, &mut maps)
     })
+}
+
+/// The estimator and the points that a function was given.
+///
+/// # Safety
+/// As `iine_estimator_compute`.
+unsafe fn read_request<'a>(
+    estimator: *mut iine_estimator,
+    points: *const iine_points,
+) -> Result<(&'a mut Estimator, Points<'a>), Error> {
+    // SAFETY: as the caller's.
+    unsafe { Ok((&mut reference_mut(estimator)?.estimator, read_points(points)?)) }
 }
 
 /// Refuses maps of `pixels` elements that overlap each other or reach into the points' fields.
