@@ -316,11 +316,10 @@ fn windows_with_far_markers_equal_the_plain_form() {
     for seed in 0..200 {
         let mut random = Random::new(seed);
         let slope = [(); 2].map(|()| random.between(-0.5, 0.5));
-        let [first, last] = [width, height].map(|end| random.below(end));
+        let [left, top] = [width, height].map(|end| random.below(end));
         let size = 1 + random.below(8);
-        let is_marked = |x: usize, y: usize| {
-            (first..first + size).contains(&x) && (last..last + size).contains(&y)
-        };
+        let is_in_block =
+            |x: usize, y: usize| (left..left + size).contains(&x) && (top..top + size).contains(&y);
         let depth_only = random.below(2) == 0;
         let one_in = random.pick(&[1000, 200, 50, 10]);
         let noise = random.pick(&[0.0, 0.1]);
@@ -328,15 +327,11 @@ fn windows_with_far_markers_equal_the_plain_form() {
             let (x, y) = (at % width, at / width);
             let [u, v] = [x, y].map(|at| at as f32 / 60.0 - 0.25);
             let z = 1.0 + slope[0] * u + slope[1] * v + noise * random.between(0.0, 1.0);
-            match 65504.0 {
-                far if is_marked(x, y) || random.below(one_in) == 0 => {
-                    if depth_only {
-                        [u * z, v * z, far]
-                    } else {
-                        [far; 3]
-                    }
-                }
-                _ => [u * z, v * z, z],
+            let is_marked = is_in_block(x, y) || random.below(one_in) == 0;
+            match (is_marked, depth_only) {
+                (false, _) => [u * z, v * z, z],
+                (true, false) => [65504.0; 3],
+                (true, true) => [u * z, v * z, 65504.0],
             }
         };
         let points = (0..width * height).map(point).collect();

@@ -81,8 +81,8 @@ impl SummedNormals {
 /// In square radians: normals about 5.3 degrees from their mean.
 const STRONG_VARIATION: f64 = 0.0085;
 
-/// Blocks whose mean is so many times as far away as where a depth's smallest change (Eq. 4) is the depth itself say nothing, as
-/// markers for "no return" do not, and sums would lose what others say.
+/// Blocks so far away that a depth's smallest change, alpha d^2 (Eq. 4), is this many times the depth are left out: they are
+/// markers for "no return", beside which sums would lose all others.
 const FARTHEST: f32 = 1000.0;
 
 /// The halves of a block: left and right, above and below.
