@@ -204,16 +204,12 @@ impl Estimator {
     pub fn compute_maps(&mut self, points: &Points, maps: &mut Maps) -> Result<(), Error> {
         self.options.check()?;
         let (width, height) = (points.width(), points.height());
-        let lengths = [
-            maps.depth_radii.as_ref().map(|map| map.len()),
-            maps.depth_changes.as_ref().map(|map| map.len()),
-            maps.distances.as_ref().map(|map| map.len()),
-            maps.smoothing_areas.as_ref().map(|map| map.len()),
-        ];
-        let eigenvalues = maps.eigenvalues.as_ref().map_or(3 * width * height, |map| map.len());
-        if lengths.into_iter().flatten().any(|length| length != width * height)
-            || eigenvalues != 3 * width * height
-        {
+        let Maps { depth_radii, depth_changes, distances, smoothing_areas, eigenvalues } = &*maps;
+        let floats = [(depth_radii, 1), (distances, 1), (smoothing_areas, 1), (eigenvalues, 3)];
+        let lengths = floats.map(|(map, fields)| map.as_ref().map(|map| (map.len(), fields)));
+        let length = depth_changes.as_ref().map(|map| (map.len(), 1));
+        let is_wrong = |(length, fields)| length != fields * width * height;
+        if lengths.into_iter().chain([length]).flatten().any(is_wrong) {
             return Err(Error::Size);
         }
         if maps.eigenvalues.is_some() && self.options.method != Method::CovarianceMatrix

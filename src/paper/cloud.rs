@@ -8,6 +8,7 @@ use crate::memory::{bytes, resize};
 use crate::methods::is_finite;
 use crate::options::{Depth, Options, Semantics};
 use crate::rect::Rect;
+use crate::vector::sum;
 
 /// An organized cloud, row by row. A missing point has NaN coordinates and NaN depth.
 #[derive(Debug, Default)]
@@ -58,11 +59,11 @@ impl Cloud {
                 let at = self.index(x, y);
                 if !self.is_missing(at) {
                     let [x, y, z] = self.points[at];
-                    *sums = plus(*sums, [x, y, z, 1.0]);
+                    *sums = sum(*sums, [x, y, z, 1.0]);
                 }
             }
         }
-        columns.into_iter().reduce(plus).expect("columns")
+        columns.into_iter().reduce(sum).expect("columns")
     }
 
     /// Takes the size of a cloud.
@@ -109,10 +110,6 @@ impl Cloud {
         let [before, step] = [[at % self.width, 1], [at / self.width, self.width]][axis];
         (1..=before).find(|gap| !self.is_missing(at - gap * step))
     }
-}
-
-fn plus(a: [f32; 4], b: [f32; 4]) -> [f32; 4] {
-    std::array::from_fn(|i| a[i] + b[i])
 }
 
 /// The user's points, looked at when they are asked for; a missing one is NaN.

@@ -7,7 +7,7 @@ use crate::Error;
 use crate::methods::is_length;
 use crate::rect::Rect;
 use crate::threads::Workers;
-use crate::vector::{cross, dot};
+use crate::vector::{cross, difference, dot, sum};
 
 /// Integral images of normals, one for each block.
 #[derive(Debug, Default)]
@@ -94,7 +94,7 @@ fn halves_of_block(cloud: &Cloud, blocks: &Blocks, block: (usize, usize)) -> [[S
             let half = [number % BLOCK, number / BLOCK].map(|line| line / MIDDLE);
             for axis in 0..2 {
                 let to = &mut halves[axis][half[axis]];
-                *to = plus(*to, [px, py, pz, 1.0]);
+                *to = sum(*to, [px, py, pz, 1.0]);
             }
         }
     }
@@ -117,11 +117,11 @@ fn halves_around(
     };
     let [x0, x1, x2, x3] = halves(column, blocks.across);
     let [top, above, below, bottom] = halves(row, blocks.down).map(|row| points.row(row));
-    let columns = |x: usize| minus(bottom[x], top[x]);
-    let rows = |row: &[Sum]| minus(row[x3], row[x0]);
+    let columns = |x: usize| difference(bottom[x], top[x]);
+    let rows = |row: &[Sum]| difference(row[x3], row[x0]);
     [
-        [minus(columns(x1), columns(x0)), minus(columns(x3), columns(x2))],
-        [minus(rows(above), rows(top)), minus(rows(bottom), rows(below))],
+        [difference(columns(x1), columns(x0)), difference(columns(x3), columns(x2))],
+        [difference(rows(above), rows(top)), difference(rows(bottom), rows(below))],
     ]
 }
 
@@ -139,14 +139,6 @@ fn normal(halves: [[Sum; 2]; 2]) -> Option<[f64; 3]> {
     let length2 = dot(normal, normal);
     let scale = 1.0 / length2.sqrt();
     is_length(length2).then(|| normal.map(|n| n * scale))
-}
-
-fn minus(a: Sum, b: Sum) -> Sum {
-    std::array::from_fn(|i| a[i] - b[i])
-}
-
-fn plus(a: Sum, b: Sum) -> Sum {
-    std::array::from_fn(|i| a[i] + b[i])
 }
 
 #[cfg(test)]
