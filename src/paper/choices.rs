@@ -104,6 +104,7 @@ impl EvenWindows<'_> {
 
     /// The block whose window each pixel takes, or [`NO_WINDOW`]: the plain form.
     pub fn choose(&self, choices: &mut [u32]) {
+        choices.fill(NO_WINDOW);
         let levels = self.levels.iter().enumerate();
         for (block, _) in levels.filter(|(_, level)| **level > 0) {
             Candidates::of(self, block).choose(choices);

@@ -13,7 +13,7 @@ use super::marks::{Marks, WORD, word_of};
 use super::{is_depth_change, of_radius, rect_around, smoothing_area, surroundings, window};
 use crate::Error;
 use crate::cloud::Points;
-use crate::memory::{bytes, refill};
+use crate::memory::{bytes, refill, resize};
 use crate::methods::Estimate;
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
@@ -42,7 +42,7 @@ pub(crate) trait Engine {
         found: &mut Windows,
     ) -> Result<(), Error>;
 
-    /// The block whose window each pixel takes, where there is one; so far there are none.
+    /// The block whose window each pixel takes, or [`NO_WINDOW`].
     fn choices(&mut self, even: &EvenWindows, choices: &mut [u32]);
 
     /// The estimates of windows around blocks' middle pixels, for the blocks that have one, by their radii.
@@ -148,7 +148,7 @@ impl SecondPass {
         refill(levels, repeat_n(0, blocks.count()))?;
         let concern = Concern { cloud, options, blocks: &blocks, sizes: &windows.sizes, normals };
         concern.find(concerned, levels, engine.workers());
-        refill(&mut self.choices, repeat_n(NO_WINDOW, cloud.depths.len()))?;
+        resize(&mut self.choices, cloud.depths.len(), NO_WINDOW)?;
         engine.even_windows(cloud, &asked, concerned, windows)?;
         // From here on CM needs no more memory: something may have been written.
         let of_even = &mut windows.of_even;

@@ -1,9 +1,7 @@
 //! Integral images (Eq. 1-3) of `N` channels.
 
-use std::iter::repeat_n;
-
 use crate::Error;
-use crate::memory::{bytes, refill};
+use crate::memory::{bytes, resize};
 use crate::rect::Rect;
 use crate::threads::Workers;
 
@@ -28,9 +26,11 @@ impl<const N: usize> SummedArea<N> {
     ) -> Result<(), Error> {
         let stride = width + 1;
         self.stride = stride;
-        refill(&mut self.sums, repeat_n([0.0; N], stride * (height + 1)))?;
+        resize(&mut self.sums, stride * (height + 1), [0.0; N])?;
+        self.sums[..stride].fill([0.0; N]);
         workers.each(self.sums[stride..].chunks_mut(stride).enumerate(), |(y, row)| {
             let mut along = [0.0; N];
+            row[0] = along;
             for (x, to) in row[1..].iter_mut().enumerate() {
                 let value = value((x, y));
                 for i in 0..N {

@@ -22,7 +22,7 @@ use crate::paper::{
 use crate::simd::{Along, Groups, Simd, load_by_fours};
 use crate::vector::dot;
 
-/// Finds the choices of the pixels of some rows of blocks, which are none so far; there is room.
+/// Finds the choices of the pixels of some rows of blocks; there is room.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
@@ -39,6 +39,7 @@ pub(super) unsafe fn rows<S: Groups>(
     let [noise, there, exact] = [least_noise; 3];
     let mut found = Found { candidates, number: 0, least_noise, noise, there, exact };
     for (row, choices) in rows {
+        choices.fill(NO_WINDOW);
         let levels = &even.levels[row * across..][..across];
         concerned.clear();
         concerned.extend((0..across).filter(|block| levels[*block] > 0));

@@ -268,7 +268,7 @@ fn even_windows(
     job.even_tiles(scratch, &Even { cloud, asked, windows, normals }, own, largest)
 }
 
-/// The block whose even window each pixel takes, where there is one; so far there are none.
+/// The block whose even window each pixel takes, or [`NO_WINDOW`].
 fn choices(isa: Isa, even: &EvenWindows, choices: &mut [u32], scratch: &mut super::Scratch) {
     let super::Scratch { workers, each, .. } = scratch;
     let rows = choices.chunks_mut(BLOCK * even.cloud.width).enumerate();
