@@ -168,6 +168,50 @@ fn exact_depths_have_exact_normals_up_to_the_edges() {
     }
 }
 
+/// Bars, slits between bars and strips at the border, as narrow as two pixels, have normals of their own, and the surface
+/// behind them too.
+#[test]
+fn narrow_surfaces_are_apart_from_what_is_behind() {
+    let (width, height) = (40, 30);
+    let mut options = options(Method::CovarianceMatrix, true, false);
+    for (near, far) in [(1.0, 1.12), (1.0, 1.5), (2.0, 1.0), (1.0, 2.0), (5.0, 1.0), (1.0, 5.0)] {
+        for (narrow, first) in
+            (1..9).flat_map(|narrow| [0, 8, 9, 10, 11].map(|first| (narrow, first)))
+        {
+            for axis in [0, 1] {
+                let point = |at: usize| {
+                    let pixel = [at % width, at / width];
+                    let is_narrow = (first..first + narrow).contains(&pixel[axis]);
+                    let z = if is_narrow { near } else { far };
+                    let [x, y] = [pixel[0] as f32 - 19.7, pixel[1] as f32 - 14.7];
+                    [x / 60.0 * z, y / 60.0 * z, z]
+                };
+                let points: Vec<_> = (0..width * height).map(point).collect();
+                for (semantics, smoothing) in
+                    [(Semantics::Pcl, 10.0), (Semantics::Pcl, 40.0), (Semantics::Paper, 10.0)]
+                {
+                    (options.semantics, options.normal_smoothing_size) = (semantics, smoothing);
+                    for method in [Method::Average3DGradient, Method::CovarianceMatrix] {
+                        options.method = method;
+                        let normals = normals(&points, width, options.clone());
+                        let is_wrong = |at: &usize| {
+                            let is_alone = narrow == 1 && points[*at][2] == near;
+                            let [nx, ny, nz] = normals[*at];
+                            let is_none = nx.is_nan();
+                            !is_alone && is_none || nx.hypot(ny) > 0.02 || nz > 0.0
+                        };
+                        let wrong = (0..points.len()).find(is_wrong);
+                        let what = format!("{semantics:?} {method:?} {smoothing}");
+                        let what = format!("{what}: {narrow} of {near} at {first} before {far}");
+                        let found = wrong.map(|at| (at % width, at / width, normals[at]));
+                        assert_eq!(found, None, "{what}, axis {axis}");
+                    }
+                }
+            }
+        }
+    }
+}
+
 /// Where a round surface turns away, neighbours are as far apart as across an edge: their slope explains that, which helps
 /// all methods but SDC.
 #[test]

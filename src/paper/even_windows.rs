@@ -17,11 +17,13 @@ const EVEN: f32 = 0.02;
 /// taken to be as far above the least one of all windows that a pixel can take.
 pub(crate) const CHANCE: f32 = 3.0;
 /// On steep surfaces the sensor's noise along the rows and columns looks like depth changes. A window with some is
-/// still on one surface if its points deviate from the plane by less than the plane changes in this many pixels, and
-/// that is no less than what is told from none: across a true change it would be side / 6 pixels, so the window must have
-/// at least `JAGGED_RADIUS` and `JAGGED_POINTS` of its points.
+/// still on one surface if its points deviate from the plane by less than the plane changes in `JAGGED` pixels, and that is
+/// no less than what is told from none. Across a true change, up to a fivefold depth, they deviate by a share of about
+/// 1 / `JAGGED_LINES` of the window's side or more, so this is a bound too, the side being as many lines as the points are
+/// along the longer one. The window must have at least `JAGGED_RADIUS` and `JAGGED_POINTS` of its points.
 pub(crate) const JAGGED: f64 = 1.4;
-pub(crate) const JAGGED_RADIUS: u32 = 2;
+pub(crate) const JAGGED_LINES: f64 = 7.0;
+pub(crate) const JAGGED_RADIUS: u32 = 4;
 pub(crate) const JAGGED_POINTS: f64 = 0.8;
 
 /// A block's even window, and what it is worth.
@@ -84,11 +86,13 @@ pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<
     let rect = |radius: u32| Rect::around(pixel, radius as usize, (cloud.width, cloud.height));
     let plane = |radius: u32| Plane::of(cloud, &rect(radius));
     let jagged = |radius: u32| {
-        let plane = plane(radius)?;
-        let steep = JAGGED * JAGGED * plane.steepness_squared;
+        let (plane, rect) = (plane(radius)?, rect(radius));
+        let longer = rect.x.len().max(rect.y.len());
+        let jagged = (plane.points / longer as f64 / JAGGED_LINES).min(JAGGED);
+        let steep = jagged * jagged * plane.steepness_squared;
         let is_jagged = plane.unevenness <= steep
             && f64::from(asked.least_noise) <= steep
-            && plane.points >= JAGGED_POINTS * rect(radius).area() as f64;
+            && plane.points >= JAGGED_POINTS * rect.area() as f64;
         is_jagged.then_some((radius, plane))
     };
     let radii = std::iter::successors(Some(wanted), |radius| Some(radius * 7 / 10));

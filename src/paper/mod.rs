@@ -28,7 +28,8 @@ pub(crate) use choices::{
 pub(crate) use cloud::{Cleaned, Cloud};
 pub(crate) use depth_change::{DepthChanges, between};
 pub(crate) use even_windows::{
-    Asked, CHANCE, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, even_window, even_windows,
+    Asked, CHANCE, EvenWindow, JAGGED, JAGGED_LINES, JAGGED_POINTS, JAGGED_RADIUS, even_window,
+    even_windows,
 };
 pub(crate) use marks::{Marks, WORD, from as marks_from, mark, word_of};
 pub(crate) use methods::estimate as plain_estimate;

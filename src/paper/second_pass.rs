@@ -225,7 +225,10 @@ impl SecondPass {
         }
         let pixel = (at % cloud.width, at / cloud.width);
         let depth = cloud.depths[at];
-        let same = |difference, distance| !is_depth_change(depth, difference, distance, options);
+        // PCL's threshold is wide: over some pixels it would reach across many a step.
+        let steps = |distance| if options.semantics == Semantics::Pcl { 1 } else { distance };
+        let same =
+            |difference, distance| !is_depth_change(depth, difference, steps(distance), options);
         let found = surroundings::plane_around(cloud, pixel, same)?;
         let has_curvature = options.method == Method::CovarianceMatrix;
         let curvature = if has_curvature { found.curvature } else { f32::NAN };

@@ -9,7 +9,7 @@ use crate::rect::Rect;
 const REACH: usize = 3;
 
 /// The plane through the points around a pixel whose `difference` in depth to the pixel's, at such a `distance`, is that of
-/// points on the same surface.
+/// points on the same surface; none if these are all on one line of the image.
 pub(crate) fn plane_around(
     cloud: &Cloud,
     (x, y): (usize, usize),
@@ -22,6 +22,8 @@ pub(crate) fn plane_around(
     let depth = cloud.depths[cloud.index(x, y)];
     let around = Rect::around((x, y), REACH, (cloud.width, cloud.height));
     let (mut points, mut count) = ([[0.0_f32; 3]; (2 * REACH + 1).pow(2)], 0);
+    // To the first other pixel.
+    let (mut first, mut are_in_line) = ([0; 2], true);
     for row in around.y {
         let at = cloud.index(around.x.start, row)..cloud.index(around.x.end, row);
         let line = cloud.depths[at.clone()].iter().zip(&cloud.points[at]);
@@ -30,12 +32,17 @@ pub(crate) fn plane_around(
             if !other.is_nan() && is_same_surface(other - depth, distance.max(1)) {
                 points[count] = *point;
                 count += 1;
+                let way = [(column, x), (row, y)].map(|(to, from)| to as isize - from as isize);
+                if first == [0; 2] {
+                    first = way;
+                }
+                are_in_line &= first[0] * way[1] == first[1] * way[0];
             }
         }
     }
     let points = &points[..count];
     // As where a sensor writes zeros for "no return".
-    if points.iter().all(|point| *point == points[0]) {
+    if are_in_line || points.iter().all(|point| *point == points[0]) {
         return None;
     }
     plane_of(|| points.iter().map(|point| point.map(f64::from)))

@@ -14,8 +14,8 @@ use crate::fast::run::RUN;
 use crate::fast::sink::Sink;
 use crate::fast::tile::{Bits, all};
 use crate::paper::{
-    Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_POINTS, JAGGED_RADIUS, MIDDLE, Plane,
-    ROUNDING, even_window, middle,
+    Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_LINES, JAGGED_POINTS, JAGGED_RADIUS,
+    MIDDLE, Plane, ROUNDING, even_window, middle,
 };
 use crate::simd::{GROUP, Groups};
 use crate::vector::dot;
@@ -439,9 +439,13 @@ impl EvenTile<'_> {
         unsafe {
             let &Cloud { width, height, .. } = self.even.cloud;
             let row = Floats::splat(y as f32);
-            let area = side(pixels.columns(), radii, width) * side(row, radii, height);
-            let steep = Doubles::splat(JAGGED * JAGGED) * fits.steepness_squared;
-            let fewest = Doubles::splat(JAGGED_POINTS) * area.widen();
+            let (across, down) = (side(pixels.columns(), radii, width), side(row, radii, height));
+            let most = Doubles::splat(JAGGED);
+            let lines = Doubles::splat(JAGGED_LINES) * across.max(down).widen();
+            let mut jagged = fits.points() / lines;
+            jagged.take(most.lt(jagged), most);
+            let steep = jagged * jagged * fits.steepness_squared;
+            let fewest = Doubles::splat(JAGGED_POINTS) * (across * down).widen();
             let least = Doubles::splat(self.even.asked.least_noise.into());
             !steep.lt(fits.unevenness) & !steep.lt(least) & !fits.points().lt(fewest)
         }
