@@ -9,6 +9,14 @@ pub(crate) struct Rect {
     pub y: Range<usize>,
 }
 
+/// Whether all pixels are on one line of the image.
+pub(crate) fn are_in_line(mut pixels: impl Iterator<Item = (usize, usize)>) -> bool {
+    let Some((x, y)) = pixels.next() else { return true };
+    let mut ways = pixels.map(|to| [to.0 as isize - x as isize, to.1 as isize - y as isize]);
+    let Some([along, down]) = ways.next() else { return true };
+    ways.all(|[dx, dy]| dx * down == dy * along)
+}
+
 impl Rect {
     /// The pixels at most `reach` columns and rows away from one, inside an image of this size.
     pub fn around((x, y): (usize, usize), reach: usize, (width, height): (usize, usize)) -> Rect {

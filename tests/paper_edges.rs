@@ -212,6 +212,38 @@ fn narrow_surfaces_are_apart_from_what_is_behind() {
     }
 }
 
+/// Points on one line of the image tell no plane, however noisy they are.
+#[test]
+fn points_in_line_have_no_normal() {
+    let (width, height) = (40, 30);
+    for noise in [0.0, 0.002] {
+        for line in [|x: usize, _: usize| x == 17, |_, y| y == 12, |x, y| x == y + 3] {
+            let point = |at: usize| {
+                let (x, y) = (at % width, at / width);
+                let z = 1.3 + 0.001 * (x + 2 * y) as f32 + noise * (at * 7919 % 101) as f32 / 101.0;
+                let [px, py] = [x as f32 - 19.7, y as f32 - 14.7].map(|way| way / 525.0 * z);
+                if line(x, y) { [px, py, z] } else { [f32::NAN; 3] }
+            };
+            let points: Vec<_> = (0..width * height).map(point).collect();
+            for semantics in Semantics::ALL {
+                for one_sided in [false, true] {
+                    for method in [
+                        Method::CovarianceMatrix,
+                        Method::Average3DGradient,
+                        Method::AverageDepthChange,
+                    ] {
+                        let mut options = options(method, one_sided, false);
+                        options.semantics = semantics;
+                        let normals = normals(&points, width, options);
+                        let found = normals.iter().filter(|normal| !normal[0].is_nan()).count();
+                        assert_eq!(found, 0, "{semantics:?} {method:?} {one_sided}, noise {noise}");
+                    }
+                }
+            }
+        }
+    }
+}
+
 /// Where a round surface turns away, neighbours are as far apart as across an edge: their slope explains that, which helps
 /// all methods but SDC.
 #[test]

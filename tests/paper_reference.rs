@@ -9,7 +9,7 @@ mod clouds;
 use clouds::{Cloud, Kind, Random, angle, compute, normal};
 use iine::{Depth, DistanceMetric, Estimator, Maps, Method, Options, Semantics};
 use iine_scenes::{Camera, Noise, REAL_FRAMES, drop_out, real_frame, scene};
-use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+use nalgebra::{Matrix2, Matrix3, SymmetricEigen, Vector2, Vector3};
 
 const METHODS: [Method; 3] =
     [Method::CovarianceMatrix, Method::Average3DGradient, Method::AverageDepthChange];
@@ -176,6 +176,18 @@ impl<'a> Reference<'a> {
         (matrix, points.len())
     }
 
+    /// Whether the window's points are on one line of the image: the pixels' own covariance matrix tells.
+    fn are_in_line(&self, window: &Window) -> bool {
+        let pixels: Vec<Vector2<f64>> = (window.top..=window.bottom)
+            .flat_map(|y| (window.left..=window.right).map(move |x| (x, y)))
+            .filter(|(x, y)| self.point(*x, *y).is_some())
+            .map(|(x, y)| Vector2::new(x as f64, y as f64))
+            .collect();
+        let mean = pixels.iter().sum::<Vector2<f64>>() / pixels.len() as f64;
+        let square = |pixel: &Vector2<f64>| (pixel - mean) * (pixel - mean).transpose();
+        pixels.iter().map(square).sum::<Matrix2<f64>>().determinant() < 1e-6
+    }
+
     fn covariance_matrix(&self, window: &Window) -> Expected {
         let (matrix, count) = self.covariance(window);
         let eigen = SymmetricEigen::new(matrix);
@@ -183,7 +195,7 @@ impl<'a> Reference<'a> {
         order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
         let [smallest, middle, _] = order.map(|i| eigen.eigenvalues[i]);
         let evenness = middle / matrix.trace();
-        if count < 3 || matrix.trace() == 0.0 || evenness < 1e-13 {
+        if count < 3 || matrix.trace() == 0.0 || evenness < 1e-13 || self.are_in_line(window) {
             return Expected::None;
         }
         if evenness < 1e-11 {

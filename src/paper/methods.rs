@@ -4,7 +4,7 @@ use super::cloud::Cleaned;
 use crate::eigen::{Scatter, eigen};
 use crate::methods::{Estimate, normal_of_tangents};
 use crate::options::Method;
-use crate::rect::Rect;
+use crate::rect::{Rect, are_in_line};
 
 /// The estimate of a method of the paper; of SIMPLE_3D_GRADIENT, which it does not have, by the 3-D gradient.
 pub(crate) fn estimate(method: Method, cloud: &Cleaned, rect: &Rect) -> Estimate {
@@ -12,7 +12,9 @@ pub(crate) fn estimate(method: Method, cloud: &Cleaned, rect: &Rect) -> Estimate
         Method::AverageDepthChange => smoothed_depth_changes(cloud, rect),
         Method::Average3DGradient | Method::Simple3DGradient => gradients(cloud, rect),
         Method::CovarianceMatrix => {
-            plane_of(|| cloud.finite(rect.clone())).unwrap_or(Estimate::NONE)
+            let mut there = rect.pixels().filter(|(x, y)| !cloud.at(*x, *y)[2].is_nan());
+            let plane = || plane_of(|| cloud.finite(rect.clone()));
+            (!are_in_line(&mut there)).then(plane).flatten().unwrap_or(Estimate::NONE)
         }
     }
 }

@@ -225,10 +225,13 @@ impl SecondPass {
         }
         let pixel = (at % cloud.width, at / cloud.width);
         let depth = cloud.depths[at];
-        // PCL's threshold is wide: over some pixels it would reach across many a step.
-        let steps = |distance| if options.semantics == Semantics::Pcl { 1 } else { distance };
-        let same =
-            |difference, distance| !is_depth_change(depth, difference, steps(distance), options);
+        let same = |difference, distance| {
+            // PCL's threshold is wide near the camera: over some pixels it would reach across many a step.
+            let is_small = options.semantics == Semantics::Pcl
+                && !is_depth_change(depth, difference, 1, options);
+            is_small
+                || !smoothing_area::is_depth_change(depth, difference, distance, &options.paper)
+        };
         let found = surroundings::plane_around(cloud, pixel, same)?;
         let has_curvature = options.method == Method::CovarianceMatrix;
         let curvature = if has_curvature { found.curvature } else { f32::NAN };

@@ -3,7 +3,7 @@
 use super::cloud::Cloud;
 use super::methods::plane_of;
 use crate::methods::Estimate;
-use crate::rect::Rect;
+use crate::rect::{Rect, are_in_line};
 
 /// How far around: fewer points are mostly noise.
 const REACH: usize = 3;
@@ -21,29 +21,22 @@ pub(crate) fn plane_around(
     }
     let depth = cloud.depths[cloud.index(x, y)];
     let around = Rect::around((x, y), REACH, (cloud.width, cloud.height));
-    let (mut points, mut count) = ([[0.0_f32; 3]; (2 * REACH + 1).pow(2)], 0);
-    // To the first other pixel.
-    let (mut first, mut are_in_line) = ([0; 2], true);
+    let (mut pixels, mut count) = ([(x, y); (2 * REACH + 1).pow(2)], 0);
     for row in around.y {
         let at = cloud.index(around.x.start, row)..cloud.index(around.x.end, row);
-        let line = cloud.depths[at.clone()].iter().zip(&cloud.points[at]);
-        for ((other, point), column) in line.zip(around.x.clone()) {
+        for (other, column) in cloud.depths[at].iter().zip(around.x.clone()) {
             let distance = x.abs_diff(column).max(y.abs_diff(row));
             if !other.is_nan() && is_same_surface(other - depth, distance.max(1)) {
-                points[count] = *point;
+                pixels[count] = (column, row);
                 count += 1;
-                let way = [(column, x), (row, y)].map(|(to, from)| to as isize - from as isize);
-                if first == [0; 2] {
-                    first = way;
-                }
-                are_in_line &= first[0] * way[1] == first[1] * way[0];
             }
         }
     }
-    let points = &points[..count];
+    let pixels = &pixels[..count];
+    let points = || pixels.iter().map(|(x, y)| cloud.points[cloud.index(*x, *y)]);
     // As where a sensor writes zeros for "no return".
-    if are_in_line || points.iter().all(|point| *point == points[0]) {
+    if are_in_line(pixels.iter().copied()) || points().all(|point| Some(point) == points().next()) {
         return None;
     }
-    plane_of(|| points.iter().map(|point| point.map(f64::from)))
+    plane_of(|| points().map(|point| point.map(f64::from)))
 }

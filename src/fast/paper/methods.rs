@@ -22,6 +22,9 @@ pub(crate) trait Sums<const N: usize>: Channels<N> {
     /// Whether the ends of the window's middle row and column are wanted.
     const ENDS: bool;
 
+    /// Whether points on one line of the image, which give no normal, may seem to give one.
+    const LINES: bool;
+
     /// What the rounding errors of sums stay below, where the points have been summed to `total` over `count` pixels
     /// and no coordinate is above `largest`.
     fn error(total: [f64; N], count: usize, largest: f32) -> f64;
@@ -107,6 +110,7 @@ impl Sums<MOMENTS> for CovarianceMatrix {
 
     const EDGE: usize = 0;
     const ENDS: bool = false;
+    const LINES: bool = true;
 
     fn error(total: [f64; MOMENTS], _: usize, _: f32) -> f64 {
         ROUNDING * (total[4] + total[5] + total[6])
@@ -189,6 +193,7 @@ impl Sums<8> for Gradients {
 
     const EDGE: usize = 1;
     const ENDS: bool = false;
+    const LINES: bool = false;
 
     fn error(_: [f64; 8], count: usize, largest: f32) -> f64 {
         error_of_differences(count, largest)
@@ -242,6 +247,7 @@ impl Sums<4> for SmoothedDepthChanges {
 
     const EDGE: usize = 1;
     const ENDS: bool = true;
+    const LINES: bool = false;
 
     fn error(_: [f64; 4], count: usize, largest: f32) -> f64 {
         error_of_differences(count, largest)

@@ -180,7 +180,7 @@ impl Tile<'_> {
         let mut rows = Rows::new(rings, 0, M::EDGE);
         for start in self.columns.clone().step_by(RUN * step) {
             run.start = start;
-            (run.lanes, run.left_out) = ([0; RUN / LANES], [0; RUN / LANES]);
+            [run.lanes, run.left_out, run.few] = [[0; RUN / LANES]; 3];
             let own = [self.block(start - self.columns.start), self.block(y - self.rows.start)];
             let is_later = PARTIAL && !layer.is_first;
             let asked =
@@ -218,6 +218,16 @@ impl Tile<'_> {
                             | rings.of_pixels::<S>(&points, WEIGHT, &pixels).lt(Floats::splat(1.0));
                         hidden[pair] |= (windows & lanes) << shift;
                         run.lanes[pair] &= !(lanes << shift);
+                    }
+                    if M::LINES {
+                        // As many as are in one row or column of a window, or fewer.
+                        let [points, _] = M::weights(&sums);
+                        let two = Floats::splat(2.0);
+                        let few = windows & points.narrow().lt(two * Floats(eight) + two);
+                        // Mostly none has.
+                        if few != 0 {
+                            run.few[pair] |= few << shift;
+                        }
                     }
                     M::note::<S>(&sums, &rects, rings, windows, &mut run.sums, at);
                     run.points.store::<S>(at, rings.points_of(&points, &pixels));
@@ -262,7 +272,7 @@ impl Tile<'_> {
                     continue;
                 }
                 let found = M::estimate::<S::Pair>(&run.sums, at, error);
-                rest[pair] = found.doubtful & windows;
+                rest[pair] = (found.doubtful | run.few[pair]) & windows;
                 any_rest |= rest[pair];
                 let here = run.points.load::<S::Pair>(at);
                 let normals = Estimates::of(found, here, self.options.viewpoint, windows);
@@ -296,7 +306,7 @@ impl Tile<'_> {
         let (step, at) = (self.step, pair * LANES);
         let (width, height) = (self.points.width(), self.points.height());
         let cleaned = Cleaned::new(self.points, self.options);
-        let Run { start, radii, sums, points, .. } = run;
+        let Run { start, radii, sums, points, few, .. } = run;
         let x = *start + at * step;
         let pixel = |lane: usize| (middle(x + lane * step, step, width), middle(y, step, height));
         let rect = |lane: usize| window(pixel(lane), radii[at + lane] as usize, width, height);
@@ -310,6 +320,7 @@ impl Tile<'_> {
                 let points = |lane: usize| cleaned.finite(rect(lane));
                 let estimate = |run: &_| M::estimate::<S::Pair>(run, at, 0.0);
                 plain = found.settle::<S, _, _>(plain, sums, at, points, estimate, |_| None);
+                plain |= few[pair] & windows;
             }
             let here = points.load::<S::Pair>(at);
             let mut normals = Estimates::of(found, here, self.options.viewpoint, windows & !plain);
@@ -385,12 +396,14 @@ pub(super) struct Run<T> {
     /// The lanes of each pair of groups that have a window, and those that are left out.
     pub lanes: [u32; RUN / LANES],
     pub left_out: [u32; RUN / LANES],
+    /// Those whose points may be on one line of the image.
+    pub few: [u32; RUN / LANES],
 }
 
 impl<T: Default> Default for Run<T> {
     fn default() -> Self {
         let (sums, points) = (T::default(), OfRun::default());
         let none = [0; RUN / LANES];
-        Run { start: 0, radii: [0.0; RUN], sums, points, lanes: none, left_out: none }
+        Run { start: 0, radii: [0.0; RUN], sums, points, lanes: none, left_out: none, few: none }
     }
 }
