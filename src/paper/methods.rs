@@ -11,16 +11,21 @@ pub(crate) fn estimate(method: Method, cloud: &Cleaned, rect: &Rect) -> Estimate
     match method {
         Method::AverageDepthChange => smoothed_depth_changes(cloud, rect),
         Method::Average3DGradient | Method::Simple3DGradient => gradients(cloud, rect),
-        Method::CovarianceMatrix => {
-            let mut there = rect.pixels().filter(|(x, y)| !cloud.at(*x, *y)[2].is_nan());
-            let plane = || plane_of(|| cloud.finite(rect.clone()));
-            (!are_in_line(&mut there)).then(plane).flatten().unwrap_or(Estimate::NONE)
-        }
+        Method::CovarianceMatrix => covariance_matrix(cloud, rect).unwrap_or(Estimate::NONE),
     }
 }
 
-/// CM (Eq. 16-25): the eigenvector of the smallest eigenvalue of the points' covariance matrix, and that eigenvalue
-/// over the trace as curvature. None if the points are on one line.
+/// CM (Eq. 16-25). None if the points are on one line, in the image or in space.
+fn covariance_matrix(cloud: &Cleaned, rect: &Rect) -> Option<Estimate> {
+    let there = rect.pixels().filter(|(x, y)| !cloud.at(*x, *y)[2].is_nan());
+    if are_in_line(there) {
+        return None;
+    }
+    plane_of(|| cloud.finite(rect.clone()))
+}
+
+/// The eigenvector of the smallest eigenvalue of the points' covariance matrix, and that eigenvalue over the trace as
+/// curvature. None if the points are on one line.
 pub(crate) fn plane_of<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> Option<Estimate> {
     let Scatter { matrix, count, .. } = Scatter::of(points)?;
     if count < 3.0 {
