@@ -191,8 +191,13 @@ fn narrow_surfaces_are_apart_from_what_is_behind() {
                     [(Semantics::Pcl, 10.0), (Semantics::Pcl, 40.0), (Semantics::Paper, 10.0)]
                 {
                     (options.semantics, options.normal_smoothing_size) = (semantics, smoothing);
-                    for method in [Method::Average3DGradient, Method::CovarianceMatrix] {
-                        options.method = method;
+                    for (method, creases) in [
+                        (Method::Average3DGradient, false),
+                        (Method::Average3DGradient, true),
+                        (Method::CovarianceMatrix, false),
+                        (Method::CovarianceMatrix, true),
+                    ] {
+                        (options.method, options.crease_windows) = (method, creases);
                         let normals = normals(&points, width, options.clone());
                         let is_wrong = |at: &usize| {
                             let is_alone = narrow == 1 && points[*at][2] == near;
@@ -201,7 +206,7 @@ fn narrow_surfaces_are_apart_from_what_is_behind() {
                             !is_alone && is_none || nx.hypot(ny) > 0.02 || nz > 0.0
                         };
                         let wrong = (0..points.len()).find(is_wrong);
-                        let what = format!("{semantics:?} {method:?} {smoothing}");
+                        let what = format!("{semantics:?} {method:?} {creases} {smoothing}");
                         let what = format!("{what}: {narrow} of {near} at {first} before {far}");
                         let found = wrong.map(|at| (at % width, at / width, normals[at]));
                         assert_eq!(found, None, "{what}, axis {axis}");
