@@ -17,8 +17,7 @@ pub(crate) fn estimate(method: Method, cloud: &Cleaned, rect: &Rect) -> Estimate
 
 /// CM (Eq. 16-25). None if the points are on one line, in the image or in space.
 fn covariance_matrix(cloud: &Cleaned, rect: &Rect) -> Option<Estimate> {
-    let there = rect.pixels().filter(|(x, y)| !cloud.at(*x, *y)[2].is_nan());
-    if are_in_line(there) {
+    if are_in_line(pixels_there(cloud, rect)) {
         return None;
     }
     plane_of(|| cloud.finite(rect.clone()))
@@ -70,7 +69,7 @@ fn smoothed_depth_changes(cloud: &Cleaned, rect: &Rect) -> Estimate {
 
 /// The tangent along a line of a rectangle: x and y from its outermost points, z from the mean difference across two pixels.
 fn tangent(cloud: &Cleaned, rect: &Rect, line: &Rect, step: (usize, usize)) -> Option<[f64; 3]> {
-    let mut there = line.pixels().filter(|(x, y)| !cloud.at(*x, *y)[2].is_nan());
+    let mut there = pixels_there(cloud, line);
     let (from, to) = (there.next()?, there.last()?);
     let length = to.0 - from.0 + to.1 - from.1;
     let slope = mean_difference(cloud, rect, step)?[2] / 2.0;
@@ -94,4 +93,9 @@ fn mean_difference(cloud: &Cleaned, rect: &Rect, (dx, dy): (usize, usize)) -> Op
         count += 1.0;
     }
     (count > 0.0).then(|| sum.map(|sum| sum / count))
+}
+
+/// The pixels of a rectangle that have a point.
+fn pixels_there<'a>(cloud: &'a Cleaned, rect: &Rect) -> impl Iterator<Item = (usize, usize)> + 'a {
+    rect.pixels().filter(|(x, y)| !cloud.at(*x, *y)[2].is_nan())
 }

@@ -4,6 +4,7 @@ use crate::Error;
 use crate::memory::{bytes, resize};
 use crate::rect::Rect;
 use crate::threads::Workers;
+use crate::vector::sum;
 
 /// What rounding on the path to a sum may gather, in units of the largest sum on it.
 pub(crate) const ROUNDING: f64 = 4.0 * f64::EPSILON;
@@ -32,19 +33,14 @@ impl<const N: usize> SummedArea<N> {
             let mut along = [0.0; N];
             row[0] = along;
             for (x, to) in row[1..].iter_mut().enumerate() {
-                let value = value((x, y));
-                for i in 0..N {
-                    along[i] += value[i];
-                }
+                along = sum(along, value((x, y)));
                 *to = along;
             }
         });
         for y in 1..=height {
             let (above, row) = self.sums[(y - 1) * stride..].split_at_mut(stride);
             for (to, above) in row.iter_mut().zip(above) {
-                for i in 0..N {
-                    to[i] += above[i];
-                }
+                *to = sum(*to, *above);
             }
         }
         Ok(())
