@@ -272,12 +272,6 @@ impl Options {
         self.semantics == Semantics::Paper && self.method == Method::CovarianceMatrix
     }
 
-    /// Whether mean 3-D gradients of blocks tell where creases are. They vary as much as CM's normals do, and need none of its
-    /// sums; the other methods' own normals, and those of PCL's windows, tell more.
-    pub(crate) fn has_block_gradients(&self) -> bool {
-        self.crease_windows && self.is_cm_of_paper()
-    }
-
     /// `BORDER_POLICY_IGNORE`: how many rows and columns at each border get no normal.
     pub(crate) fn ignored_border(&self) -> usize {
         match self.border_policy {

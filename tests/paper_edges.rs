@@ -2,7 +2,9 @@
 //! coverage on real frames where `IINE_TEST_DATA` has them.
 
 use iine::{Depth, Estimator, Method, Normals, Options, Points, Semantics};
-use iine_scenes::{Band, Camera, Distances, Frame, Noise, REAL_FRAMES, Random, real_frame, scene};
+use iine_scenes::{
+    Band, Camera, Distances, Frame, Noise, REAL_FRAMES, Random, Scene, Shape, real_frame, scene,
+};
 
 /// A Kinect's frame, a quarter of it: from this column and row on.
 fn camera(from: [f64; 2]) -> Camera {
@@ -138,6 +140,34 @@ fn the_second_pass_leaves_smooth_surfaces_as_they_are() {
             });
             println!("{name} {noise:?}: {second:.3} of {single:.3} deg");
             assert!(second <= 1.05 * single, "{name} {noise:?}: {second} of {single}");
+        }
+    }
+}
+
+/// However small they are: normals that vary because a surface is round are no crease.
+#[test]
+fn the_second_pass_leaves_round_objects_as_they_are() {
+    let camera = camera([160.0, 120.0]);
+    for pixels in [20.0, 35.0, 50.0, 80.0, 120.0] {
+        let radius = pixels / camera.focal;
+        let ball = Shape::Sphere { center: [0.0, 0.0, 1.0 + radius], radius };
+        let (base, axis) = ([-1.0, -3.0, 1.0 + radius], [2.0, 6.0, 0.0]);
+        let pole = Shape::Cylinder { base, axis, radius };
+        for shape in [ball, pole] {
+            let exact = Scene { shapes: vec![shape.clone()] }.render(&camera);
+            for (noise, times) in [(Noise::None, 1.02), (Noise::Khoshelham, 1.15)] {
+                let frame = noise.apply(&exact, &mut Random::new(1));
+                for method in [Method::CovarianceMatrix, Method::Average3DGradient] {
+                    let [single, second] = [false, true].map(|creases| {
+                        let options = options(method, false, creases);
+                        score(&frame, &normals(&frame.points, frame.width(), options), |_| true)
+                    });
+                    let what = format!("{pixels} px, {noise:?}, {method:?}, {shape:?}");
+                    println!("{what}: {:.3} of {:.3} deg", second.mean, single.mean);
+                    assert_eq!(second.coverage, single.coverage, "{what}");
+                    assert!(second.mean <= times * single.mean, "{what}");
+                }
+            }
         }
     }
 }

@@ -1,9 +1,13 @@
-//! Where the surface's normals vary strongly: near edges without a depth change.
+//! Where the surface's normals vary strongly, but not because it is round: near edges without a depth change.
+
+use std::iter::repeat_n;
+use std::mem;
 
 use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::cloud::Cloud;
 use super::summed_area::SummedArea;
 use crate::Error;
+use crate::memory::{bytes, refill};
 use crate::methods::is_length;
 use crate::rect::Rect;
 use crate::threads::Workers;
@@ -15,13 +19,31 @@ pub(crate) struct SummedNormals {
     normals: SummedArea<4>,
     /// Of the blocks' points, which they can be made from: x, y, z, and how many there are.
     points: SummedArea<4>,
+    /// How much the surface bends around each block; NaN where that is not known.
+    bends: Vec<f32>,
 }
 
 /// The sum of some points, and their number.
 type Sum = [f64; 4];
 
 impl SummedNormals {
-    /// Sums others; NaN where there is none.
+    /// Sums the points of a cloud, the blocks of which are summed. `alpha` is the sensor's.
+    pub fn sum_points(
+        &mut self,
+        cloud: &Cloud,
+        alpha: f32,
+        blocks: &Blocks,
+        workers: &Workers,
+    ) -> Result<(), Error> {
+        let farthest = FARTHEST / alpha;
+        self.points.sum_up(blocks.across, blocks.down, workers, |(column, row)| {
+            let sum @ [x, y, z, count] = cloud.sums[row * blocks.across + column];
+            let is_near = |value: f32| value.abs() <= farthest * count;
+            if is_near(x) && is_near(y) && is_near(z) { sum.map(f64::from) } else { [0.0; 4] }
+        })
+    }
+
+    /// Sums the normals of blocks; NaN where there is none.
     pub fn sum(
         &mut self,
         estimates: &[[f32; 4]],
@@ -34,25 +56,17 @@ impl SummedNormals {
         })
     }
 
-    /// Sums those across the mean 3-D gradients of a cloud, the blocks of which are summed, in windows of these radii around
-    /// them; 0 for none. `alpha` is the sensor's.
+    /// Sums those across the mean 3-D gradients of the points that were summed, in windows of these radii around blocks; 0
+    /// for none.
     pub fn sum_gradients(
         &mut self,
         cloud: &Cloud,
-        alpha: f32,
         blocks: &Blocks,
         radius: impl Fn((usize, usize)) -> u32 + Sync,
         workers: &Workers,
     ) -> Result<(), Error> {
-        let (across, down) = (blocks.across, blocks.down);
-        let farthest = FARTHEST / alpha;
-        self.points.sum_up(across, down, workers, |(column, row)| {
-            let sum @ [x, y, z, count] = cloud.sums[row * across + column];
-            let is_near = |value: f32| value.abs() <= farthest * count;
-            if is_near(x) && is_near(y) && is_near(z) { sum.map(f64::from) } else { [0.0; 4] }
-        })?;
         let points = &self.points;
-        self.normals.sum_up(across, down, workers, |block| {
+        self.normals.sum_up(blocks.across, blocks.down, workers, |block| {
             let halves = match radius(block) {
                 0 => return [0.0; 4],
                 radius if radius <= MIDDLE as u32 => halves_of_block(cloud, blocks, block),
@@ -62,9 +76,85 @@ impl SummedNormals {
         })
     }
 
+    /// Finds how much the surface bends around each block, in windows of as many blocks to each side as `reach` says; 0
+    /// where that is not known. Points and normals have been summed.
+    pub fn find_bends(
+        &mut self,
+        blocks: &Blocks,
+        reach: impl Fn(usize) -> usize + Sync,
+        workers: &Workers,
+    ) -> Result<(), Error> {
+        let mut bends = mem::take(&mut self.bends);
+        refill(&mut bends, repeat_n(f32::NAN, blocks.count()))?;
+        workers.each(bends.chunks_mut(blocks.across).enumerate(), |(row, bends)| {
+            for (column, bend) in bends.iter_mut().enumerate() {
+                match reach(row * blocks.across + column) {
+                    0 => (),
+                    reach => *bend = self.bend(blocks, (column, row), reach) as f32,
+                }
+            }
+        });
+        self.bends = bends;
+        Ok(())
+    }
+
+    /// How far the mean point of a window's middle half is from that of the window, along the block's normal, as a share of
+    /// how much larger the window is: half the mean curvature, or so. NaN if there is none.
+    fn bend(&self, blocks: &Blocks, block: (usize, usize), reach: usize) -> f64 {
+        let around = |reach: usize| Rect::around(block, reach, (blocks.across, blocks.down));
+        let [nx, ny, nz, there] = self.normals.sum(&around(0));
+        let [middle, window] = [reach / 2, reach].map(|reach| self.points.sum(&around(reach)));
+        // Of a window without points rounding may be left.
+        if there == 0.0 || middle[3] == 0.0 {
+            return f64::NAN;
+        }
+        let mean = |[x, y, z, count]: Sum| {
+            let share = 1.0 / count;
+            [x * share, y * share, z * share]
+        };
+        let out = dot([nx, ny, nz], difference(mean(middle), mean(window)));
+        let side2 = |reach: usize| ((2 * reach + 1) * (2 * reach + 1)) as f64;
+        out / (side2(reach) - side2(reach / 2))
+    }
+
+    /// Whether the surface bends around a block as it does at so many blocks to each side, and half as many: it is round
+    /// there. Beside a crease it does not.
+    pub fn bend_alike(
+        &self,
+        blocks: &Blocks,
+        (column, row): (usize, usize),
+        distance: usize,
+    ) -> bool {
+        let bend = |x: usize, y: usize| self.bends[y * blocks.across + x];
+        let least = ALIKE_BENDS * bend(column, row);
+        if least.is_nan() {
+            return false;
+        }
+        let lines = |at: usize, count: usize, distance: usize| {
+            [at.saturating_sub(distance), at, (at + distance).min(count - 1)]
+        };
+        let mut known = 0;
+        for distance in [distance, distance.div_ceil(2)] {
+            for y in lines(row, blocks.down, distance) {
+                for x in lines(column, blocks.across, distance) {
+                    let bend = bend(x, y);
+                    if bend.is_nan() {
+                        continue;
+                    }
+                    // Both may be below 0.
+                    if least * bend <= least * least {
+                        return false;
+                    }
+                    known += 1;
+                }
+            }
+        }
+        known >= FEWEST_BENDS
+    }
+
     /// Bytes held.
     pub fn size(&self) -> usize {
-        self.points.size() + self.normals.size()
+        self.points.size() + self.normals.size() + bytes(&self.bends)
     }
 
     /// Whether the normals of the blocks that a rectangle of pixels touches vary strongly, or there are none. How much they
@@ -80,6 +170,11 @@ impl SummedNormals {
 
 /// In square radians: normals about 5.3 degrees from their mean.
 const STRONG_VARIATION: f64 = 0.0085;
+
+/// Bends are alike that are on the same side and at least this share of the block's own, of which noise and the way a surface
+/// is seen leave no more; and that is told from so many places at least, the own one counted twice.
+const ALIKE_BENDS: f32 = 0.2;
+const FEWEST_BENDS: u32 = 6;
 
 /// Blocks so far away that a depth's smallest change, alpha d^2 (Eq. 4), is this many times the depth are left out: they are
 /// markers for "no return", beside which sums would lose all others.
@@ -175,13 +270,39 @@ mod tests {
                 let cloud = cloud(marker, |x| 2.0 + 0.3 * x + bend * (x - 0.45).abs());
                 let (blocks, workers) = (Blocks::of(cloud.width, cloud.height), Workers::default());
                 let mut normals = SummedNormals::default();
+                normals.sum_points(&cloud, alpha, &blocks, &workers).unwrap();
                 for radius in [1, 2, 3, 7, 8, 20] {
-                    normals.sum_gradients(&cloud, alpha, &blocks, |_| radius, &workers).unwrap();
+                    normals.sum_gradients(&cloud, &blocks, |_| radius, &workers).unwrap();
                     let vary_in = |x| normals.vary_in(&Rect { x, y: 0..cloud.height });
                     assert_eq!(vary_in(25..65), varies, "marker {marker}, radius {radius}");
                     assert!(!vary_in(0..20), "marker {marker}, radius {radius}");
                 }
             }
+        }
+    }
+
+    #[test]
+    fn round_surfaces_bend_alike_and_creases_do_not() {
+        let alpha = Options::default().paper.alpha;
+        let round = |x: f32| 2.0 + 0.3 * x + 0.8 * (x - 0.45).powi(2);
+        let creased = |x: f32| 2.0 + 0.3 * x + 0.5 * (x - 0.45).abs();
+        let hollow = |x: f32| 2.0 + 0.3 * x - 0.8 * (x - 0.45).powi(2);
+        let cases: [(fn(f32) -> f32, bool); 3] = [(round, true), (hollow, true), (creased, false)];
+        for (depth, is_round) in cases {
+            let cloud = cloud(f32::NAN, depth);
+            let (blocks, workers) = (Blocks::of(cloud.width, cloud.height), Workers::default());
+            let mut normals = SummedNormals::default();
+            normals.sum_points(&cloud, alpha, &blocks, &workers).unwrap();
+            normals.sum_gradients(&cloud, &blocks, |_| 5, &workers).unwrap();
+            for reach in [1, 2, 3] {
+                normals.find_bends(&blocks, |_| reach, &workers).unwrap();
+                for column in 9..14 {
+                    let alike = normals.bend_alike(&blocks, (column, 7), reach + 1);
+                    assert_eq!(alike, is_round, "reach {reach}, column {column}");
+                }
+            }
+            normals.find_bends(&blocks, |_| 0, &workers).unwrap();
+            assert!(!normals.bend_alike(&blocks, (11, 7), 2));
         }
     }
 

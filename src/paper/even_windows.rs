@@ -4,7 +4,7 @@
 //! A pixel beside a depth change or a crease is in the middle of no large window that lies on one surface, but it is
 //! at the edge or in the corner of some, which are the even windows of blocks nearby.
 
-use super::blocks::Blocks;
+use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::cloud::Cloud;
 use super::depth_change::Clean;
 use super::planes::Plane;
@@ -62,6 +62,17 @@ impl Asked<'_> {
     /// of a crease or on the other is told from less noise then.
     pub fn largest(&self, block: usize) -> u32 {
         (2 * self.wanted[block]).min(self.limit)
+    }
+
+    /// The largest radius without a depth change in it.
+    pub fn clean_radius(&self, block: usize) -> usize {
+        self.largest(block).min(self.clean.radii[block] as u32) as usize
+    }
+
+    /// The largest window of whole blocks without a depth change in it that is no larger: how many are to each side.
+    pub fn clean_blocks(&self, block: usize) -> usize {
+        let clean = (self.clean.radii[block] as usize).saturating_sub(MIDDLE);
+        clean.min(self.largest(block) as usize) / BLOCK
     }
 
     /// The variance told from none where the sensor's smallest depth change is `alpha`.

@@ -135,18 +135,19 @@ impl SecondPass {
         let asked = Asked { blocks, wanted, clean, limit, least_noise };
         if options.crease_windows {
             let radius = |block| sample_radius(&windows.sizes, cloud, &blocks, block, options);
-            if options.has_block_gradients() {
-                let alpha = options.paper.alpha;
-                normals.sum_gradients(cloud, alpha, &blocks, radius, engine.workers())?;
+            normals.sum_points(cloud, options.paper.alpha, &blocks, engine.workers())?;
+            if options.is_cm_of_paper() {
+                normals.sum_gradients(cloud, &blocks, radius, engine.workers())?;
             } else {
                 refill(radii, (0..blocks.count()).map(|block| radius(blocks.place(block))))?;
                 engine.of_blocks(&blocks, radii, &mut windows.of_even)?;
                 normals.sum(&windows.of_even, &blocks, engine.workers())?;
             }
+            normals.find_bends(&blocks, |block| asked.clean_blocks(block), engine.workers())?;
         }
         concerned.clear(size)?;
         refill(levels, repeat_n(0, blocks.count()))?;
-        let concern = Concern { cloud, options, blocks: &blocks, sizes: &windows.sizes, normals };
+        let concern = Concern { cloud, options, asked: &asked, sizes: &windows.sizes, normals };
         concern.find(concerned, levels, engine.workers());
         resize(&mut self.choices, cloud.depths.len(), NO_WINDOW)?;
         engine.even_windows(cloud, &asked, concerned, windows)?;
@@ -244,7 +245,7 @@ impl SecondPass {
 struct Concern<'a> {
     cloud: &'a Cloud,
     options: &'a Options,
-    blocks: &'a Blocks,
+    asked: &'a Asked<'a>,
     /// As [`Windows`] has them.
     sizes: &'a [f32],
     normals: &'a SummedNormals,
@@ -253,7 +254,7 @@ struct Concern<'a> {
 impl Concern<'_> {
     /// Marks them, and the levels of their blocks.
     fn find(&self, concerned: &mut Marks, levels: &mut [u8], workers: &Workers) {
-        let (words, across) = (concerned.stride(), self.blocks.across);
+        let (words, across) = (concerned.stride(), self.asked.blocks.across);
         let bands = concerned.bands(BLOCK).zip(levels.chunks_mut(across));
         workers.each(bands.enumerate(), |(row, (concerned, levels))| {
             for (word, levels) in levels.chunks_mut(WORD / BLOCK).enumerate() {
@@ -288,7 +289,7 @@ impl Concern<'_> {
             let of_block = ((1 << BLOCK) - 1) << (block * BLOCK);
             *level = if is_one_sided & of_block != 0 { EVERY_LEVEL } else { 0 };
             let column = columns.start / BLOCK + block;
-            if options.crease_windows && self.normals_vary((column, row)) {
+            if options.crease_windows && self.is_beside_crease((column, row)) {
                 beside_creases |= of_block;
                 *level = CREASE_LEVELS.max(*level);
             }
@@ -311,9 +312,17 @@ impl Concern<'_> {
         word_of(found.map(|(depth, size)| size + 1.0 <= wanted_size(*depth, &options)))
     }
 
+    /// Whether normals vary strongly around a block whose surface is not round.
+    fn is_beside_crease(&self, block: (usize, usize)) -> bool {
+        let Asked { blocks, .. } = self.asked;
+        let number = block.1 * blocks.across + block.0;
+        let distance = self.asked.clean_radius(number).div_ceil(BLOCK);
+        self.normals_vary(block) && !self.normals.bend_alike(blocks, block, distance)
+    }
+
     /// Whether normals vary where the window of a block's middle pixel is, or else of its first one that has a window.
     fn normals_vary(&self, block: (usize, usize)) -> bool {
-        let &Concern { cloud, options, blocks, sizes, normals } = self;
+        let &Concern { cloud, options, asked: &Asked { blocks, .. }, sizes, normals } = self;
         let (mut x, mut y) = blocks.middle_of(block);
         let mut size = sizes[cloud.index(x, y)];
         if size == 0.0 {
