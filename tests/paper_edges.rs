@@ -22,6 +22,17 @@ fn options(method: Method, one_sided: bool, creases: bool) -> Options {
     options
 }
 
+/// Those that docs/paper.md gives for depths without noise.
+fn options_of_exact(method: Method, radius: u32, one_sided: bool) -> Options {
+    let mut options = options(method, one_sided, true);
+    options.paper.alpha = 1e-4;
+    options.paper.gamma = 140.0;
+    options.paper.smallest_radius = 1;
+    options.paper.least_depth_radius = radius;
+    options.paper.largest_radius = radius;
+    options
+}
+
 fn normals(points: &[[f32; 3]], width: usize, options: Options) -> Vec<[f32; 3]> {
     let height = points.len() / width;
     let mut normals = vec![[f32::NAN; 3]; points.len()];
@@ -168,6 +179,17 @@ fn the_second_pass_leaves_round_objects_as_they_are() {
                     assert!(second.mean <= times * single.mean, "{what}");
                 }
             }
+            for radius in [1, 2] {
+                let [single, second] = [false, true].map(|creases| {
+                    let mut options = options_of_exact(Method::CovarianceMatrix, radius, false);
+                    options.crease_windows = creases;
+                    score(&exact, &normals(&exact.points, exact.width(), options), |_| true)
+                });
+                let what = format!("{pixels} px, radius {radius}, {shape:?}");
+                println!("{what}: {:.3} of {:.3} deg", second.mean, single.mean);
+                let times = if pixels < 30.0 { 1.6 } else { 1.2 };
+                assert!(second.mean <= times * single.mean, "{what}");
+            }
         }
     }
 }
@@ -178,12 +200,7 @@ fn exact_depths_have_exact_normals_up_to_the_edges() {
         let (frame, distances) = frame(name, [160.0, y], Noise::None);
         for method in [Method::CovarianceMatrix, Method::Average3DGradient] {
             for side in [3, 5] {
-                let mut options = options(method, true, true);
-                options.paper.alpha = 1e-4;
-                options.paper.gamma = 140.0;
-                options.paper.smallest_radius = 1;
-                options.paper.least_depth_radius = side / 2;
-                options.paper.largest_radius = side / 2;
+                let options = options_of_exact(method, side / 2, true);
                 let normals = normals(&frame.points, frame.width(), options);
                 let bounds = [(Band::Crease, 0.2), (Band::DepthEdge, 0.3), (Band::Elsewhere, 0.01)];
                 for (band, bound) in bounds {

@@ -72,7 +72,7 @@ impl Asked<'_> {
     /// The largest window of whole blocks without a depth change in it that is no larger: how many are to each side.
     pub fn clean_blocks(&self, block: usize) -> usize {
         let clean = (self.clean.radii[block] as usize).saturating_sub(MIDDLE);
-        clean.min(self.largest(block) as usize) / BLOCK
+        clean.min(BLOCK.max(self.largest(block) as usize)) / BLOCK
     }
 
     /// The variance told from none where the sensor's smallest depth change is `alpha`.

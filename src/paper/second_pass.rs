@@ -88,6 +88,9 @@ pub(crate) struct SecondPass {
     radii: Vec<u32>,
 }
 
+/// Up to this distance at least depth changes are found: bends are those of some blocks' windows.
+const LEAST_CLEAN: u32 = (BLOCK + MIDDLE + 1) as u32;
+
 /// As often as a radius can be halved.
 const EVERY_LEVEL: u8 = u32::BITS as u8;
 
@@ -128,7 +131,7 @@ impl SecondPass {
         }
         let size = (cloud.width, cloud.height);
         let limit = options.paper.largest_radius;
-        let clean = depth_changes.clean(size, limit, engine.workers())?;
+        let clean = depth_changes.clean(size, limit.max(LEAST_CLEAN), engine.workers())?;
         let blocks = Blocks::of(cloud.width, cloud.height);
         find_wanted(wanted, cloud, &blocks, options, engine.workers())?;
         let least_noise = Asked::least_noise(options.paper.alpha);
