@@ -104,7 +104,7 @@ impl SummedNormals {
         let around = |reach: usize| Rect::around(block, reach, (blocks.across, blocks.down));
         let [nx, ny, nz, there] = self.normals.sum(&around(0));
         let [middle, window] = [reach / 2, reach].map(|reach| self.points.sum(&around(reach)));
-        // Of a window without points rounding may be left.
+        // Numbers of points are exact.
         if there == 0.0 || middle[3] == 0.0 {
             return f64::NAN;
         }
@@ -117,14 +117,9 @@ impl SummedNormals {
         out / (side2(reach) - side2(reach / 2))
     }
 
-    /// Whether the surface bends around a block as it does at so many blocks to each side, and half as many: it is round
-    /// there. Beside a crease it does not.
-    pub fn bend_alike(
-        &self,
-        blocks: &Blocks,
-        (column, row): (usize, usize),
-        distance: usize,
-    ) -> bool {
+    /// Whether the surface bends around a block as it does at the places around: it is round there. Beside a crease
+    /// it does not.
+    pub fn bend_alike(&self, blocks: &Blocks, (column, row): (usize, usize)) -> bool {
         let bend = |x: usize, y: usize| self.bends[y * blocks.across + x];
         let least = ALIKE_BENDS * bend(column, row);
         if least.is_nan() {
@@ -134,7 +129,7 @@ impl SummedNormals {
             [at.saturating_sub(distance), at, (at + distance).min(count - 1)]
         };
         let mut known = 0;
-        for distance in [distance, distance.div_ceil(2)] {
+        for distance in BENDS_APART {
             for y in lines(row, blocks.down, distance) {
                 for x in lines(column, blocks.across, distance) {
                     let bend = bend(x, y);
@@ -170,6 +165,11 @@ impl SummedNormals {
 
 /// In square radians: normals about 5.3 degrees from their mean.
 const STRONG_VARIATION: f64 = 0.0085;
+
+/// How many blocks to each side windows reach at most by which bends are told: faces between creases may be small.
+pub(crate) const BEND_REACH: usize = 2;
+/// And how many blocks away they are compared with a block's own: windows there are beside a crease that the block is on.
+const BENDS_APART: [usize; 2] = [3, 2];
 
 /// Bends are alike that are on the same side and at least this share of the block's own, of which noise and the way a surface
 /// is seen leave no more; and that is told from so many places at least, the own one counted twice.
@@ -291,15 +291,15 @@ mod tests {
             let mut normals = SummedNormals::default();
             normals.sum_points(&cloud, alpha, &blocks, &workers).unwrap();
             normals.sum_gradients(&cloud, &blocks, |_| 5, &workers).unwrap();
-            for reach in [1, 2, 3] {
+            for reach in [1, 2] {
                 normals.find_bends(&blocks, |_| reach, &workers).unwrap();
                 for column in 9..14 {
-                    let alike = normals.bend_alike(&blocks, (column, 7), reach + 1);
+                    let alike = normals.bend_alike(&blocks, (column, 7));
                     assert_eq!(alike, round != 0.0, "{round} {creased}: {reach}, {column}");
                 }
             }
             normals.find_bends(&blocks, |_| 0, &workers).unwrap();
-            assert!(!normals.bend_alike(&blocks, (11, 7), 2));
+            assert!(!normals.bend_alike(&blocks, (11, 7)));
         }
     }
 

@@ -6,6 +6,7 @@
 
 use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::cloud::Cloud;
+use super::creases::BEND_REACH;
 use super::depth_change::Clean;
 use super::planes::Plane;
 use crate::rect::Rect;
@@ -64,15 +65,11 @@ impl Asked<'_> {
         (2 * self.wanted[block]).min(self.limit)
     }
 
-    /// The largest radius without a depth change in it.
-    pub fn clean_radius(&self, block: usize) -> usize {
-        self.largest(block).min(self.clean.radii[block] as u32) as usize
-    }
-
-    /// The largest window of whole blocks without a depth change in it that is no larger: how many are to each side.
+    /// A window of whole blocks without a depth change in it, as large as an even window may be but not much larger than a
+    /// block: how many are to each side.
     pub fn clean_blocks(&self, block: usize) -> usize {
         let clean = (self.clean.radii[block] as usize).saturating_sub(MIDDLE);
-        clean.min(BLOCK.max(self.largest(block) as usize)) / BLOCK
+        clean.min(self.largest(block) as usize).clamp(clean.min(BLOCK), BEND_REACH * BLOCK) / BLOCK
     }
 
     /// The variance told from none where the sensor's smallest depth change is `alpha`.

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::choices::{EvenWindows, NO_WINDOW};
 use super::cloud::Cloud;
-use super::creases::SummedNormals;
+use super::creases::{BEND_REACH, SummedNormals};
 use super::depth_change::DepthChanges;
 use super::even_windows::{Asked, EvenWindow};
 use super::marks::{Marks, WORD, word_of};
@@ -88,9 +88,6 @@ pub(crate) struct SecondPass {
     radii: Vec<u32>,
 }
 
-/// Up to this distance at least depth changes are found: bends are those of some blocks' windows.
-const LEAST_CLEAN: u32 = (BLOCK + MIDDLE + 1) as u32;
-
 /// As often as a radius can be halved.
 const EVERY_LEVEL: u8 = u32::BITS as u8;
 
@@ -131,7 +128,9 @@ impl SecondPass {
         }
         let size = (cloud.width, cloud.height);
         let limit = options.paper.largest_radius;
-        let clean = depth_changes.clean(size, limit.max(LEAST_CLEAN), engine.workers())?;
+        // Windows of whole blocks reach somewhat farther than small ones.
+        let farthest = limit.max((BEND_REACH * BLOCK + MIDDLE) as u32);
+        let clean = depth_changes.clean(size, farthest, engine.workers())?;
         let blocks = Blocks::of(cloud.width, cloud.height);
         find_wanted(wanted, cloud, &blocks, options, engine.workers())?;
         let least_noise = Asked::least_noise(options.paper.alpha);
@@ -140,6 +139,8 @@ impl SecondPass {
             let radius = |block| sample_radius(&windows.sizes, cloud, &blocks, block, options);
             normals.sum_points(cloud, options.paper.alpha, &blocks, engine.workers())?;
             if options.is_cm_of_paper() {
+                // They vary as much as CM's normals do, and need none of its sums. The other methods' own normals, and those
+                // of PCL's windows, tell more.
                 normals.sum_gradients(cloud, &blocks, radius, engine.workers())?;
             } else {
                 refill(radii, (0..blocks.count()).map(|block| radius(blocks.place(block))))?;
@@ -317,10 +318,7 @@ impl Concern<'_> {
 
     /// Whether normals vary strongly around a block whose surface is not round.
     fn is_beside_crease(&self, block: (usize, usize)) -> bool {
-        let Asked { blocks, .. } = self.asked;
-        let number = block.1 * blocks.across + block.0;
-        let distance = self.asked.clean_radius(number).div_ceil(BLOCK);
-        self.normals_vary(block) && !self.normals.bend_alike(blocks, block, distance)
+        self.normals_vary(block) && !self.normals.bend_alike(&self.asked.blocks, block)
     }
 
     /// Whether normals vary where the window of a block's middle pixel is, or else of its first one that has a window.
