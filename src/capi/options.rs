@@ -394,8 +394,8 @@ pub unsafe extern "C" fn iine_estimator_set_one_sided_windows(
     unsafe { set(estimator, change) }
 }
 
-/// Whether a second pass moves windows off the places where the normals vary strongly, so that edges
-/// without a depth change stay sharp: 0 (the default) or 1. With either semantics; takes the sensor's alpha from
+/// Whether a second pass moves windows off the places where the normals vary strongly but the surface is not round, so that
+/// edges without a depth change stay sharp: 0 (the default) or 1. With either semantics; takes the sensor's alpha from
 /// `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of `iine_estimator_set_paper_radii`.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.

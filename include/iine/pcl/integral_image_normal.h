@@ -462,8 +462,8 @@ namespace iine
         options_.one_sided_windows = one_sided_windows;
       }
 
-      /** \brief Set whether a second pass moves windows off the places where the normals vary strongly, so
-        * that edges without a depth change stay sharp. With either semantics, and the alpha of \ref setPaperAlpha and
+      /** \brief Set whether a second pass moves windows off the places where the normals vary strongly but the surface is not
+        * round, so that edges without a depth change stay sharp. With either semantics, and the alpha of \ref setPaperAlpha and
         * the largest radius of \ref setPaperRadii. Not in PCL's class.
         * \param[in] crease_windows whether it does; default false
         */
