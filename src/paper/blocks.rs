@@ -13,6 +13,11 @@ pub(crate) fn middle(first: usize, size: usize, count: usize) -> usize {
     (first + size / 2).min(count - 1)
 }
 
+/// The columns or rows of blocks, of so many, at a distance before `at`, its own, and behind it.
+pub(crate) fn lines_around(at: usize, distance: usize, count: usize) -> [usize; 3] {
+    [at.saturating_sub(distance), at, (at + distance).min(count - 1)]
+}
+
 /// An image's blocks, row by row; those at its right and lower edges may be cut.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Blocks {

@@ -6,7 +6,7 @@
 //! Blocks are seldom on more than two surfaces, so two of a block's pixels choose for all: the middle one, and the one
 //! to which the window of the middle one is worth least.
 
-use super::blocks::{BLOCK, Blocks, MIDDLE};
+use super::blocks::{BLOCK, Blocks, MIDDLE, lines_around};
 use super::cloud::Cloud;
 use super::even_windows::{Asked, EvenWindow};
 use super::marks::Marks;
@@ -46,12 +46,6 @@ impl EvenWindow {
 
 /// The choice of a pixel that takes no window.
 pub(crate) const NO_WINDOW: u32 = u32::MAX;
-
-/// The columns or rows of blocks, of so many, at the places of windows of a radius: before block `at`, its own, behind.
-fn places(at: usize, radius: usize, count: usize) -> [usize; 3] {
-    let distance = radius.div_ceil(BLOCK);
-    [at.saturating_sub(distance), at, (at + distance).min(count - 1)]
-}
 
 /// Those of the places around a block, 0 before it, 1 its own, 2 behind it. Of windows that are worth the same, the one
 /// at the middle of an edge is nearer.
@@ -94,8 +88,9 @@ impl EvenWindows<'_> {
         let half = |radius: &u32| (*radius > BLOCK as u32).then_some(radius / 2);
         let radii = std::iter::successors((largest > 0).then_some(largest), half);
         for (level, radius) in (0..self.levels[block]).zip(radii) {
-            let columns = places(x, radius as usize, across);
-            let rows = places(y, radius as usize, down).map(|row| row * across);
+            let distance = (radius as usize).div_ceil(BLOCK);
+            let columns = lines_around(x, distance, across);
+            let rows = lines_around(y, distance, down).map(|row| row * across);
             for (column, row) in places_at(level) {
                 visit(rows[*row] + columns[*column]);
             }

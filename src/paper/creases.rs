@@ -1,9 +1,8 @@
 //! Where the surface's normals vary strongly, but not because it is round: near edges without a depth change.
 
 use std::iter::repeat_n;
-use std::mem;
 
-use super::blocks::{BLOCK, Blocks, MIDDLE};
+use super::blocks::{BLOCK, Blocks, MIDDLE, lines_around};
 use super::cloud::Cloud;
 use super::summed_area::SummedArea;
 use crate::Error;
@@ -84,37 +83,17 @@ impl SummedNormals {
         reach: impl Fn(usize) -> usize + Sync,
         workers: &Workers,
     ) -> Result<(), Error> {
-        let mut bends = mem::take(&mut self.bends);
-        refill(&mut bends, repeat_n(f32::NAN, blocks.count()))?;
+        let SummedNormals { normals, points, bends } = self;
+        refill(bends, repeat_n(f32::NAN, blocks.count()))?;
         workers.each(bends.chunks_mut(blocks.across).enumerate(), |(row, bends)| {
-            for (column, bend) in bends.iter_mut().enumerate() {
+            for (column, to) in bends.iter_mut().enumerate() {
                 match reach(row * blocks.across + column) {
                     0 => (),
-                    reach => *bend = self.bend(blocks, (column, row), reach) as f32,
+                    reach => *to = bend(normals, points, blocks, (column, row), reach) as f32,
                 }
             }
         });
-        self.bends = bends;
         Ok(())
-    }
-
-    /// How far the mean point of a window's middle half is from that of the window, along the block's normal, as a share of
-    /// how much larger the window is: half the mean curvature, or so. NaN if there is none.
-    fn bend(&self, blocks: &Blocks, block: (usize, usize), reach: usize) -> f64 {
-        let around = |reach: usize| Rect::around(block, reach, (blocks.across, blocks.down));
-        let [nx, ny, nz, there] = self.normals.sum(&around(0));
-        let [middle, window] = [reach / 2, reach].map(|reach| self.points.sum(&around(reach)));
-        // Numbers of points are exact.
-        if there == 0.0 || middle[3] == 0.0 {
-            return f64::NAN;
-        }
-        let mean = |[x, y, z, count]: Sum| {
-            let share = 1.0 / count;
-            [x * share, y * share, z * share]
-        };
-        let out = dot([nx, ny, nz], difference(mean(middle), mean(window)));
-        let side2 = |reach: usize| ((2 * reach + 1) * (2 * reach + 1)) as f64;
-        out / (side2(reach) - side2(reach / 2))
     }
 
     /// Whether the surface bends around a block as it does at the places around: it is round there. Beside a crease
@@ -125,22 +104,16 @@ impl SummedNormals {
         if least.is_nan() {
             return false;
         }
-        let lines = |at: usize, count: usize, distance: usize| {
-            [at.saturating_sub(distance), at, (at + distance).min(count - 1)]
-        };
         let mut known = 0;
         for distance in BENDS_APART {
-            for y in lines(row, blocks.down, distance) {
-                for x in lines(column, blocks.across, distance) {
+            for y in lines_around(row, distance, blocks.down) {
+                for x in lines_around(column, distance, blocks.across) {
                     let bend = bend(x, y);
-                    if bend.is_nan() {
-                        continue;
-                    }
                     // Both may be below 0.
                     if least * bend <= least * least {
                         return false;
                     }
-                    known += 1;
+                    known += u32::from(!bend.is_nan());
                 }
             }
         }
@@ -179,6 +152,31 @@ const FEWEST_BENDS: u32 = 6;
 /// Blocks so far away that a depth's smallest change, alpha d^2 (Eq. 4), is this many times the depth are left out: they are
 /// markers for "no return", beside which sums would lose all others.
 const FARTHEST: f32 = 1000.0;
+
+/// How far the mean point of a window's middle part is from that of the window, along the block's normal, as a share of
+/// how much larger the window is: half the mean curvature, or so. NaN if there is none.
+fn bend(
+    normals: &SummedArea<4>,
+    points: &SummedArea<4>,
+    blocks: &Blocks,
+    block: (usize, usize),
+    reach: usize,
+) -> f64 {
+    let around = |reach: usize| Rect::around(block, reach, (blocks.across, blocks.down));
+    let [nx, ny, nz, there] = normals.sum(&around(0));
+    let [middle, window] = [reach / 2, reach].map(|reach| points.sum(&around(reach)));
+    // Numbers of points are exact.
+    if there == 0.0 || middle[3] == 0.0 {
+        return f64::NAN;
+    }
+    let mean = |[x, y, z, count]: Sum| {
+        let share = 1.0 / count;
+        [x * share, y * share, z * share]
+    };
+    let out = dot([nx, ny, nz], difference(mean(middle), mean(window)));
+    let side2 = |reach: usize| ((2 * reach + 1) * (2 * reach + 1)) as f64;
+    out / (side2(reach) - side2(reach / 2))
+}
 
 /// The halves of a block: left and right, above and below.
 fn halves_of_block(cloud: &Cloud, blocks: &Blocks, block: (usize, usize)) -> [[Sum; 2]; 2] {

@@ -69,7 +69,8 @@ impl Asked<'_> {
     /// block: how many are to each side.
     pub fn clean_blocks(&self, block: usize) -> usize {
         let clean = (self.clean.radii[block] as usize).saturating_sub(MIDDLE);
-        clean.min(self.largest(block) as usize).clamp(clean.min(BLOCK), BEND_REACH * BLOCK) / BLOCK
+        let most = (self.largest(block) as usize).clamp(BLOCK, BEND_REACH * BLOCK);
+        clean.min(most) / BLOCK
     }
 
     /// The variance told from none where the sensor's smallest depth change is `alpha`.
