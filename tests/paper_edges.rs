@@ -166,7 +166,10 @@ fn the_second_pass_leaves_round_objects_as_they_are() {
         let pole = Shape::Cylinder { base, axis, radius };
         for shape in [ball, pole] {
             let exact = Scene { shapes: vec![shape.clone()] }.render(&camera);
-            for (noise, times) in [(Noise::None, 1.02), (Noise::Khoshelham, 1.15)] {
+            let much = if pixels < 50.0 { 1.35 } else { 1.12 };
+            for (noise, times) in
+                [(Noise::None, 1.02), (Noise::Khoshelham, 1.1), (Noise::Nguyen, much)]
+            {
                 let frame = noise.apply(&exact, &mut Random::new(1));
                 for method in [Method::CovarianceMatrix, Method::Average3DGradient] {
                     let [single, second] = [false, true].map(|creases| {
@@ -175,7 +178,7 @@ fn the_second_pass_leaves_round_objects_as_they_are() {
                     });
                     let what = format!("{pixels} px, {noise:?}, {method:?}, {shape:?}");
                     println!("{what}: {:.3} of {:.3} deg", second.mean, single.mean);
-                    assert_eq!(second.coverage, single.coverage, "{what}");
+                    assert!(second.coverage >= single.coverage, "{what}");
                     assert!(second.mean <= times * single.mean, "{what}");
                 }
             }

@@ -1,7 +1,8 @@
 //! Which even window each pixel takes: the one that is worth most to it, that which leaves the smallest error in the
 //! slope of a plane through its points. Noise of variance v in n points leaves 12 v / (n L^2) in a window of side L;
 //! points that do not lie in the window's plane, or a pixel that does not, bend it by some share of their deviation over
-//! L. And beside a crease, the one on the pixel's side.
+//! L; and where the surface itself bends, the slope changes by that from pixel to pixel. And beside a crease, the one on
+//! the pixel's side.
 //!
 //! Blocks are seldom on more than two surfaces, so two of a block's pixels choose for all: the middle one, and the one
 //! to which the window of the middle one is worth least.
@@ -15,11 +16,9 @@ use crate::options::Options;
 use crate::rect::Rect;
 use crate::vector::dot;
 
-/// What the part of a window's variance that is not noise counts.
+/// What the part of a window's variance that is not noise counts, and the squared distance of the points next to the pixel
+/// from the window's plane where it is more than `NEAR_NOISE` variances of their mean.
 pub(crate) const MISFIT: f32 = 3.0;
-/// What the squared distance of the points next to the pixel from the window's plane counts, where it is more than
-/// `NEAR_NOISE` variances of their mean.
-pub(crate) const NEAR: f32 = 3.0;
 pub(crate) const NEAR_NOISE: f32 = 4.0;
 /// How many pixels beyond its window's edge a plane may be taken for a pixel's: outlines are ragged.
 pub(crate) const REACH: f32 = 4.0;
@@ -41,6 +40,12 @@ impl EvenWindow {
     /// in which they change tells.
     fn is_exact(&self, least_noise: f32) -> bool {
         self.noise < least_noise && self.steepness * self.steepness > least_noise
+    }
+
+    /// What one of a mean square deviation that is not noise costs.
+    pub fn per_misfit(radius: f32) -> f32 {
+        let side = 2.0 * radius + 1.0;
+        MISFIT / (side * side)
     }
 }
 
@@ -146,7 +151,7 @@ impl<'a> Candidates<'a> {
         found.is_exact = exact > EXACT_SHARE * found.windows.len() as f32;
         for Candidate { window, cost, .. } in &mut found.windows {
             let misfit = (window.unevenness - found.noise).max(0.0);
-            *cost = found.noise * window.per_noise + MISFIT * misfit * window.per_bend;
+            *cost = found.noise * window.per_noise + misfit * EvenWindow::per_misfit(window.radius);
         }
         found
     }
@@ -241,9 +246,11 @@ impl<'a> Candidates<'a> {
         let [x, y] = pixel.way;
         let plane = inverse_depth_along(window.q, pixel.ray);
         let astray = pixel.near.inverse_depth - plane;
-        let astray = (astray * astray - NEAR_NOISE * self.noise / pixel.near.points).max(0.0);
+        let astray = (astray * astray - pixel.near.noise).max(0.0);
         let short = (length([x - dx, y - dy]) - window.radius).max(0.0);
-        let cost = (even + astray * (NEAR * window.per_bend)) * (1.0 + short * short);
+        let (dx, dy) = (x - dx, y - dy);
+        let even = even + window.bend2 * (dx * dx + dy * dy);
+        let cost = (even + astray * EvenWindow::per_misfit(window.radius)) * (1.0 + short * short);
         let lies_in =
             || (pixel.inverse_depth - plane).abs() < pixel.tolerance + JITTER * window.steepness;
         if short == 0.0 || lies_in() { cost } else { f32::INFINITY }
@@ -284,10 +291,11 @@ impl<'a> Candidates<'a> {
         let mean = rect.x.clone().map(of_column).sum::<f32>() / NEXT;
         let is_clean = !asked.clean.spoilt.has((x, y));
         let is_whole = rect.area() as f32 == NEXT && !mean.is_nan();
+        let noise = NEAR_NOISE * self.noise;
         if is_whole && is_clean && !self.is_exact {
-            Near { inverse_depth: mean, points: NEXT }
+            Near { inverse_depth: mean, noise: noise / NEXT }
         } else {
-            Near { inverse_depth: inverse(x, y), points: 1.0 }
+            Near { inverse_depth: inverse(x, y), noise }
         }
     }
 }
@@ -324,8 +332,8 @@ struct Pixel {
     near: Near,
 }
 
-/// The mean of points next to a pixel, and their number.
+/// The mean of points next to a pixel, and the squared distance from it that noise explains.
 struct Near {
     inverse_depth: f32,
-    points: f32,
+    noise: f32,
 }

@@ -41,9 +41,11 @@ pub(crate) struct EvenWindow {
     /// The mean square deviation from the plane, and the variance that it may be of.
     pub unevenness: f32,
     pub noise: f32,
-    /// What one of noise and one of bend count.
+    /// What one of noise counts.
     pub per_noise: f32,
-    pub per_bend: f32,
+    /// How much the slope changes from pixel to pixel, squared: a plane through all points is wrong by that much for each
+    /// pixel from the middle.
+    pub bend2: f32,
 }
 
 /// What windows are asked for.
@@ -102,7 +104,7 @@ pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<
         let is_jagged = plane.unevenness <= steep
             && f64::from(asked.least_noise) <= steep
             && plane.points >= JAGGED_POINTS * rect.area() as f64;
-        is_jagged.then_some((radius, plane))
+        is_jagged.then_some((radius, plane, 0.0))
     };
     let radii = std::iter::successors(Some(wanted), |radius| Some(radius * 7 / 10));
     let mut radii = radii.take_while(|radius| *radius > clean && *radius >= JAGGED_RADIUS);
@@ -110,20 +112,24 @@ pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<
         let chance = (2.0 / (plane.points as f32 - 3.0)).sqrt();
         plane.unevenness * f64::from(1.0 + CHANCE * chance)
     };
-    let (radius, plane) = radii.find_map(jagged).or_else(|| {
+    let least_noise = f64::from(asked.least_noise);
+    let (radius, plane, bend2) = radii.find_map(jagged).or_else(|| {
         let mut radius = asked.largest(block).min(clean);
         let mut found = plane(radius)?;
         while radius > 1
             && let Some(half) = plane(radius / 2)
-            && found.unevenness >= noise(&half).max(f64::from(asked.least_noise))
         {
+            if found.unevenness < noise(&half).max(least_noise) {
+                let sides2 = [radius, radius / 2].map(|radius| (2 * radius + 1).pow(2));
+                let bend2 = found.bend2(&half, f64::from(sides2[0] - sides2[1]), least_noise);
+                return Some((radius, found, bend2));
+            }
             (radius, found) = (radius / 2, half);
         }
-        Some((radius, found))
+        Some((radius, found, 0.0))
     })?;
     let (radius, points) = (radius as f32, plane.points as f32);
     let side = 2.0 * radius + 1.0;
-    let per_bend = 1.0 / (side * side);
     Some(EvenWindow {
         radius,
         q: plane.q.map(|q| q as f32),
@@ -131,7 +137,7 @@ pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<
         steepness: plane.steepness_squared.sqrt() as f32,
         unevenness: plane.unevenness as f32,
         noise: noise(&plane) as f32,
-        per_noise: 12.0 / points * per_bend,
-        per_bend,
+        per_noise: 12.0 / points / (side * side),
+        bend2: bend2 as f32,
     })
 }

@@ -22,7 +22,7 @@ mod surroundings;
 
 pub(crate) use blocks::{BLOCK, Blocks, MIDDLE, middle};
 pub(crate) use choices::{
-    ALIKE, CREASE_COST, CREASE_NOISE, EXACT_SHARE, EvenWindows, MISFIT, NEAR, NEAR_NOISE, NEXT,
+    ALIKE, CREASE_COST, CREASE_NOISE, EXACT_SHARE, EvenWindows, MISFIT, NEAR_NOISE, NEXT,
     NO_WINDOW, REACH, places_at,
 };
 pub(crate) use cloud::{Cleaned, Cloud};

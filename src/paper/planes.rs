@@ -17,8 +17,9 @@ pub(crate) const JITTER: f32 = 4.0;
 #[derive(Clone, Copy)]
 pub(crate) struct Plane {
     pub q: [f64; 3],
-    /// The ray of the points' mean.
+    /// The ray of the points' mean, and its inverse depth.
     pub ray: [f64; 3],
+    pub inverse_depth: f64,
     pub points: f64,
     /// The mean square deviation of inverse depths; infinite where the points are not on one surface.
     pub unevenness: f64,
@@ -35,6 +36,8 @@ impl Plane {
     /// The largest variance along the line of sight, as a share of the mean's square, with which depths are much the same:
     /// else points are not on one surface.
     pub(crate) const DEEP: f64 = 0.25;
+    /// The mean of a window's middle is off its plane by chance: so many variances of it are not the surface's bend.
+    pub(crate) const BEND_NOISE: f64 = 4.0;
 
     /// None if there are too few finite points to tell how well the plane fits, or if they are on one line of the image.
     pub fn of(cloud: &Cloud, rect: &Rect) -> Option<Plane> {
@@ -71,10 +74,23 @@ impl Plane {
         Some(Plane {
             q,
             ray: m.map(|mean| mean / depth),
+            inverse_depth: 1.0 / depth,
             points: n,
             unevenness: if is_deep { f64::INFINITY } else { deviation2 / depth2 },
             steepness_squared: if is_deep { 0.0 } else { slope2 * angle2 },
         })
+    }
+
+    /// How much the slope of the surface changes from pixel to pixel, squared, as far as it is not chance: told from how far
+    /// the mean of the window's middle is off this plane. The square of the window's side is by `sides2` more than that of
+    /// its middle.
+    pub fn bend2(&self, middle: &Plane, sides2: f64, least_noise: f64) -> f64 {
+        let off = dot(self.q, middle.ray) - middle.inverse_depth;
+        let noise = self.unevenness.max(least_noise) * (1.0 / middle.points - 1.0 / self.points);
+        let off2 = (off * off - Self::BEND_NOISE * noise.max(0.0)).max(0.0);
+        // The mean of a parabola over a side is above its top by a 24th of the bend times the side's square.
+        let bend = 24.0 / sides2;
+        off2 * bend * bend
     }
 }
 
@@ -82,4 +98,35 @@ impl Plane {
 pub(crate) fn inverse_depth(depth: f32) -> f32 {
     let inverse = 1.0 / depth;
     if inverse.is_finite() { inverse } else { f32::NAN }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::Points;
+    use crate::options::{Options, Semantics};
+
+    #[test]
+    fn bends_are_told_from_noise() {
+        let (width, height, middle) = (41, 31, (20, 15));
+        let options = Options { semantics: Semantics::Paper, ..Options::default() };
+        for (bend, noise) in [(0.0, 1e-3), (2e-4, 0.0), (-2e-4, 0.0), (2e-4, 1e-4), (2e-5, 1e-2)] {
+            let point = |at: usize| {
+                let [x, y] = [(at % width) as f32 - 20.0, (at / width) as f32 - 15.0];
+                let noise = if at.is_multiple_of(2) { noise } else { -noise };
+                let z = 1.0 / (0.5 + 0.002 * x - 0.001 * y + bend / 2.0 * x * x + noise);
+                [x / 500.0 * z, y / 500.0 * z, z]
+            };
+            let points: Vec<_> = (0..width * height).flat_map(point).collect();
+            let points = Points::interleaved(&points, width, height, 3, 0).unwrap();
+            let cloud = Cloud::new(&points, &options).unwrap();
+            let plane = |radius: usize| {
+                Plane::of(&cloud, &Rect::around(middle, radius, (width, height))).unwrap()
+            };
+            let found = plane(10).bend2(&plane(5), 441.0 - 121.0, 1e-12).sqrt();
+            let expected = if bend.abs() > 1e-4 { bend.abs() } else { 0.0 };
+            let off = (found - f64::from(expected)).abs();
+            assert!(off <= 0.1 * f64::from(expected), "bend {bend}, noise {noise}: {found}");
+        }
+    }
 }

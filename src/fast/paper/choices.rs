@@ -16,7 +16,7 @@ use crate::memory::{bytes, make_room, refill, resize};
 use crate::options::{Options, Semantics};
 use crate::paper::{
     ALIKE, BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows,
-    JITTER, MIDDLE, MISFIT, NEAR, NEAR_NOISE, NEXT, NO_WINDOW, REACH, inverse_depth, marks_from,
+    JITTER, MIDDLE, MISFIT, NEAR_NOISE, NEXT, NO_WINDOW, REACH, inverse_depth, marks_from,
     places_at,
 };
 use crate::simd::{Along, Groups, Simd, load_by_fours};
@@ -139,14 +139,15 @@ struct Windows<S: Simd> {
     planes: Planes<S>,
     /// The rays of their mean points.
     ray: [Floats<S>; 3],
-    per_bend: Floats<S>,
+    per_misfit: Floats<S>,
+    bend2: Floats<S>,
     /// What they cost any pixel; infinite for those that may not take theirs.
     even: Floats<S>,
     /// How far the sensor's noise along rows and columns moves points off the plane.
     jitter: Floats<S>,
 }
 
-const WINDOW_FIELDS: usize = 12;
+const WINDOW_FIELDS: usize = 13;
 
 /// Planes q P = 1.
 #[derive(Clone, Copy)]
@@ -186,7 +187,7 @@ struct Pixels<S: Simd> {
 #[derive(Clone, Copy)]
 struct Near<S: Simd> {
     inverse_depth: Floats<S>,
-    points: Floats<S>,
+    noise: Floats<S>,
 }
 
 impl<S: Simd> Windows<S> {
@@ -199,16 +200,18 @@ impl<S: Simd> Windows<S> {
         // SAFETY: as the caller's.
         let [zero, even] = unsafe { [0.0, f32::INFINITY].map(|value| Floats::splat(value)) };
         let (middle, planes, ray) = ([zero; 2], Planes([zero; 3]), [zero; 3]);
-        Windows { middle, radius: zero, planes, ray, per_bend: zero, even, jitter: zero }
+        let [radius, per_misfit, bend2, jitter] = [zero; 4];
+        Windows { middle, radius, planes, ray, per_misfit, bend2, even, jitter }
     }
 
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn store(&self, to: &mut [Lanes; WINDOW_FIELDS]) {
-        let Windows { middle: [dx, dy], radius, planes, ray, per_bend, even, jitter } = *self;
+        let Windows { middle: [dx, dy], radius, planes, ray, per_misfit, bend2, even, jitter } =
+            *self;
         let (Planes([a, b, c]), [x, y, z]) = (planes, ray);
-        let fields = [dx, dy, radius, a, b, c, x, y, z, per_bend, even, jitter];
+        let fields = [dx, dy, radius, a, b, c, x, y, z, per_misfit, bend2, even, jitter];
         for i in 0..WINDOW_FIELDS {
             // SAFETY: as the caller's; the array holds so many lanes.
             unsafe { S::store(to[i].0.as_mut_ptr(), fields[i].0) };
@@ -227,9 +230,9 @@ impl<S: Simd> Windows<S> {
             // SAFETY: as the caller's.
             fields[i].0 = unsafe { from[i].load::<S>() };
         }
-        let [dx, dy, radius, a, b, c, x, y, z, per_bend, even, jitter] = fields;
+        let [dx, dy, radius, a, b, c, x, y, z, per_misfit, bend2, even, jitter] = fields;
         let (planes, ray) = (Planes([a, b, c]), [x, y, z]);
-        Windows { middle: [dx, dy], radius, planes, ray, per_bend, even, jitter }
+        Windows { middle: [dx, dy], radius, planes, ray, per_misfit, bend2, even, jitter }
     }
 
     /// Takes the others of a mask.
@@ -243,7 +246,8 @@ impl<S: Simd> Windows<S> {
             self.ray[i].take(mask, other.ray[i]);
         }
         self.radius.take(mask, other.radius);
-        self.per_bend.take(mask, other.per_bend);
+        self.per_misfit.take(mask, other.per_misfit);
+        self.bend2.take(mask, other.bend2);
         self.even.take(mask, other.even);
         self.jitter.take(mask, other.jitter);
     }
@@ -253,20 +257,21 @@ impl<S: Simd> Windows<S> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn cost(&self, pixels: &Pixels<S>, noise: Floats<S>) -> Floats<S> {
-        let &Windows { middle: [dx, dy], radius, planes, per_bend, even, jitter, .. } = self;
-        let Near { inverse_depth, points } = pixels.near;
+    unsafe fn cost(&self, pixels: &Pixels<S>) -> Floats<S> {
+        let &Windows { middle: [dx, dy], radius, planes, per_misfit, bend2, even, jitter, .. } =
+            self;
+        let Near { inverse_depth, noise } = pixels.near;
         // SAFETY: as the caller's.
         unsafe {
             let (zero, one) = (Floats::splat(0.0), Floats::splat(1.0));
             let plane = planes.at(pixels.ray);
             let astray = inverse_depth - plane;
-            let near_noise = Floats::splat(NEAR_NOISE) * noise / points;
-            let astray = (astray * astray - near_noise).max(zero);
+            let astray = (astray * astray - noise).max(zero);
             let [x, y] = pixels.at;
-            let distance = (x - dx).abs().max((y - dy).abs());
-            let short = (distance - radius).max(zero);
-            let cost = (even + astray * (Floats::splat(NEAR) * per_bend)) * (one + short * short);
+            let (dx, dy) = (x - dx, y - dy);
+            let short = (dx.abs().max(dy.abs()) - radius).max(zero);
+            let even = even + bend2 * (dx * dx + dy * dy);
+            let cost = (even + astray * per_misfit) * (one + short * short);
             let off = (pixels.inverse_depth - plane).abs();
             let lies_in = S::lt(off.0, (pixels.tolerance + jitter).0);
             let is_beyond = S::and_not(lies_in, S::lt(zero.0, short.0));
@@ -290,7 +295,7 @@ impl<S: Simd> Pixels<S> {
         self.inverse_depth.take(mask, other.inverse_depth);
         self.tolerance.take(mask, other.tolerance);
         self.near.inverse_depth.take(mask, other.near.inverse_depth);
-        self.near.points.take(mask, other.near.points);
+        self.near.noise.take(mask, other.near.noise);
     }
 }
 
@@ -338,7 +343,6 @@ impl<S: Along> Found<'_, S> {
         let place = |lane: usize| columns.first[lane] + rows.first[lane];
         let windows = windows.as_ptr();
         let to = &mut self.candidates[self.number];
-        self.number += 1;
         for lane in 0..S::LANES {
             to.places[lane] = place(lane) as u32;
         }
@@ -347,7 +351,7 @@ impl<S: Along> Found<'_, S> {
             let window = |lane: usize| windows.add(to.places[lane] as usize).cast::<f32>();
             let [radius, a, b, c] = load_by_fours::<S>(window);
             let [x, y, z, steepness] = load_by_fours::<S>(|lane| window(lane).add(4));
-            let [unevenness, noise, per_noise, per_bend] =
+            let [unevenness, noise, per_noise, bend2] =
                 load_by_fours::<S>(|lane| window(lane).add(8));
             let (radius, steepness) = (Floats(radius), Floats(steepness));
             let planes = Planes([Floats(a), Floats(b), Floats(c)]);
@@ -356,9 +360,16 @@ impl<S: Along> Found<'_, S> {
             let middle @ [dx, dy] = [columns.from_own, rows.from_own];
             let is_near = S::lt(dx.abs().max(dy.abs()).0, (radius + Floats::splat(REACH + 1.0)).0);
             let may_take = S::and(may_take, S::and(is_near, S::lt(zero, radius.0)));
+            if S::bits(may_take) == 0 {
+                return;
+            }
+            self.number += 1;
             let jitter = Floats::splat(JITTER) * steepness;
-            let (per_bend, even) = (Floats(per_bend), Floats(zero));
-            Windows { middle, radius, planes, ray, per_bend, even, jitter }.store(&mut to.windows);
+            let side = radius + radius + Floats(one);
+            let per_misfit = Floats::splat(MISFIT) / (side * side);
+            let (bend2, even) = (Floats(bend2), Floats(zero));
+            Windows { middle, radius, planes, ray, per_misfit, bend2, even, jitter }
+                .store(&mut to.windows);
             S::store(to.may_take.0.as_mut_ptr(), may_take);
             S::store(to.unevenness.0.as_mut_ptr(), unevenness);
             S::store(to.per_noise.0.as_mut_ptr(), per_noise);
@@ -416,8 +427,7 @@ impl<S: Along> Found<'_, S> {
                 let per_noise = Floats(to.per_noise.load::<S>());
                 let mut windows = Windows::load(&to.windows);
                 let misfit = (unevenness - self.noise).max(Floats::splat(0.0));
-                let misfit = Floats::splat(MISFIT) * misfit * windows.per_bend;
-                let even = self.noise * per_noise + misfit;
+                let even = self.noise * per_noise + misfit * windows.per_misfit;
                 let may_take = to.may_take.load::<S>();
                 windows.even.0 = S::select(may_take, even.0, S::splat(f32::INFINITY));
                 windows.store(&mut to.windows);
@@ -441,7 +451,7 @@ impl<S: Along> Found<'_, S> {
             let mut windows = Windows::none();
             for (number, candidates) in found.iter_mut().enumerate() {
                 let these = Windows::load(&candidates.windows);
-                let cost = these.cost(pixels, noise);
+                let cost = these.cost(pixels);
                 S::store(candidates.cost.0.as_mut_ptr(), cost.0);
                 let better = S::lt(cost.0, least.0);
                 // Mostly none is.
@@ -455,9 +465,9 @@ impl<S: Along> Found<'_, S> {
             least = Floats::splat(CREASE_COST) * least;
             let first = windows;
             for (number, candidates) in found.iter().enumerate() {
-                let these = Windows::load(&candidates.windows);
                 let cost = Floats(candidates.cost.load::<S>());
                 let is_better = S::lt(cost.0, least.0);
+                let these = Windows::load(&candidates.windows);
                 let crease = Crease::between(&these, &first, noise);
                 let better = S::and(is_better, crease.is_first_side(pixels.ray));
                 // Mostly none is.
@@ -556,17 +566,21 @@ impl Group<'_> {
             for lane in 0..self.blocks.len() {
                 columns[lane] = self.blocks[lane] * BLOCK;
             }
-            let (blocks, exact) = (self.blocks.len(), found.is_exact());
+            let (blocks, noise) = ((&columns, self.blocks.len()), (found.noise, found.is_exact()));
             let mut pixels = MaybeUninit::uninit();
-            let pixels = rows.pixels(self.even, self.row, (&columns, blocks), exact, &mut pixels);
+            let pixels = rows.pixels(self.even, self.row, blocks, noise, &mut pixels);
             let mut first = pixels[MIDDLE * BLOCK + MIDDLE];
             for other in pixels {
-                first.take(S::and_not(first.there.0, other.there.0), other);
+                let takes = S::and_not(first.there.0, other.there.0);
+                // Mostly none does.
+                if S::bits(takes) != 0 {
+                    first.take(takes, other);
+                }
             }
             let (first_best, first_windows) = found.best(&first);
             let mut first_costs = [found.noise; BLOCK * BLOCK];
             for number in 0..BLOCK * BLOCK {
-                first_costs[number] = first_windows.cost(&pixels[number], found.noise);
+                first_costs[number] = first_windows.cost(&pixels[number]);
             }
             let (mut second, mut largest) = (first, S::splat(-1.0));
             for (other, cost) in pixels.iter().zip(first_costs) {
@@ -584,7 +598,7 @@ impl Group<'_> {
             let none = S::splat(f32::from_bits(NO_WINDOW));
             let mut taken = [none; BLOCK * BLOCK];
             for ((number, own), first_cost) in pixels.iter().enumerate().zip(first_costs) {
-                let second_cost = second_windows.cost(own, found.noise);
+                let second_cost = second_windows.cost(own);
                 let (alike, times) = (Floats::splat(ALIKE), Floats::splat(ALIKE * CREASE_COST));
                 let is_better = S::lt(second_cost.0, (alike * first_cost).0);
                 let to_first = S::and(
@@ -609,11 +623,15 @@ impl Group<'_> {
                 for (to, fours) in of_blocks.iter_mut().zip(S::transpose_fours(columns_of_line)) {
                     S::store(to.0.as_mut_ptr(), fours);
                 }
-                for lane in 0..blocks {
+                for lane in 0..self.blocks.len() {
                     // Four of the first lane, then of the fourth next to it; between them those of the lanes between.
                     let four = &of_blocks[lane % 4].0[lane / 4 * 4..][..BLOCK];
-                    for (to, place) in choices[columns[lane]..].iter_mut().zip(four) {
-                        *to = place.to_bits();
+                    let four: [u32; BLOCK] = std::array::from_fn(|at| four[at].to_bits());
+                    let to = &mut choices[columns[lane]..];
+                    // The last block may be cut.
+                    match to.first_chunk_mut() {
+                        Some(to) => *to = four,
+                        None => to.copy_from_slice(&four[..to.len()]),
                     }
                 }
             }
@@ -836,7 +854,7 @@ impl Rows {
     }
 
     /// The pixels of so many blocks, at most one for each lane, whose first columns are these, in a `row` of blocks: lanes
-    /// without one take no window. Pixels of the mask `exact` count alone. They are written in place, as there are kilobytes.
+    /// without one take no window. Depths have this `noise`; pixels of the mask `exact` count alone. They are written in place, as there are kilobytes.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
@@ -846,7 +864,7 @@ impl Rows {
         even: &EvenWindows,
         row: usize,
         (columns, blocks): (&[usize; LANES], usize),
-        exact: S::F,
+        (noise, exact): (Floats<S>, S::F),
         pixels: &'p mut MaybeUninit<[Pixels<S>; BLOCK * BLOCK]>,
     ) -> &'p [Pixels<S>; BLOCK * BLOCK] {
         let &EvenWindows { cloud, options, .. } = even;
@@ -855,7 +873,9 @@ impl Rows {
         // SAFETY: as the caller's; there are so many elements and points from every column on, and all pixels are written.
         unsafe {
             let there = S::mask((1 << blocks) - 1);
-            let (none, one) = (S::splat(f32::NAN), S::splat(1.0));
+            let none = S::splat(f32::NAN);
+            let noise = Floats::splat(NEAR_NOISE) * noise;
+            let of_mean = noise / Floats::splat(NEXT);
             let to = pixels.as_mut_ptr().cast::<Pixels<S>>();
             for line in 0..BLOCK {
                 let depths = self.four::<S>(&self.depths, line, columns);
@@ -871,10 +891,10 @@ impl Rows {
                     let has_mean = S::and_not(exact, S::eq(mean, mean));
                     let near = Near {
                         inverse_depth: Floats(S::select(has_mean, mean, inverse_depth.0)),
-                        points: Floats(S::select(has_mean, S::splat(NEXT), one)),
+                        noise: Floats(S::select(has_mean, of_mean.0, noise.0)),
                     };
                     let [x, y, z] = points[column];
-                    let z = if cloud.has_range { z * inverse_depth } else { Floats(one) };
+                    let z = if cloud.has_range { z * inverse_depth } else { Floats::splat(1.0) };
                     let number = line * BLOCK + column;
                     let [dx, dy] = [column, line].map(|line| line as f32 - MIDDLE as f32);
                     to.add(number).write(Pixels {

@@ -65,6 +65,7 @@ struct Fits<S: Groups> {
     sums: [Doubles<S>; MOMENTS],
     q: [Doubles<S>; 3],
     ray: [Doubles<S>; 3],
+    inverse_depth: Doubles<S>,
     unevenness: Doubles<S>,
     steepness_squared: Doubles<S>,
     /// The lanes that have one, those in which rounding may have had a say, and those that hold hidden points.
@@ -88,6 +89,7 @@ impl<S: Groups> Fits<S> {
             sums,
             q: three,
             ray: three,
+            inverse_depth: one,
             unevenness,
             steepness_squared: one,
             there,
@@ -106,6 +108,7 @@ impl<S: Groups> Fits<S> {
             self.q[i].take(lanes, others.q[i]);
             self.ray[i].take(lanes, others.ray[i]);
         }
+        self.inverse_depth.take(lanes, others.inverse_depth);
         self.unevenness.take(lanes, others.unevenness);
         self.steepness_squared.take(lanes, others.steepness_squared);
     }
@@ -127,6 +130,25 @@ impl<S: Groups> Fits<S> {
             let chance = Floats::splat(2.0) / (self.points().narrow() - Floats::splat(3.0));
             let chance = Floats::splat(1.0) + Floats::splat(CHANCE) * chance.sqrt();
             self.unevenness * chance.widen()
+        }
+    }
+
+    /// [`Plane::bend2`]
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn bend2(&self, middle: &Self, sides2: Floats<S>, least_noise: Doubles<S>) -> Floats<S> {
+        // SAFETY: as the caller's.
+        unsafe {
+            let off = dot(self.q, middle.ray) - middle.inverse_depth;
+            let one = Doubles::splat(1.0);
+            let noise =
+                self.unevenness.max(least_noise) * (one / middle.points() - one / self.points());
+            let (zero, most) = (Doubles::splat(0.0), Doubles::splat(Plane::BEND_NOISE));
+            let off2 = (off * off - most * noise.max(zero)).max(zero);
+            let bend = Doubles::splat(24.0) / sides2.widen();
+            (off2 * bend * bend).narrow()
         }
     }
 }
@@ -276,7 +298,7 @@ impl EvenTile<'_> {
             let mut even = zero.lt(largest) & !jagged;
             let mut radii = largest;
             radii.take(S::mask(jagged), wanted);
-            let mut found = zero;
+            let (mut found, mut bend2) = (zero, zero);
             let mut best = Fits::<S>::none();
             let (mut doubtful, mut hidden, mut decided) = (0, 0, 0);
             loop {
@@ -309,7 +331,14 @@ impl EvenTile<'_> {
                     hidden |= fits.hidden & todo;
                 }
                 let is_jagged = jagged & fits.there & self.jagged(&fits, &pixels, radii, y);
-                let is_better = even & fits.there & !best.unevenness.lt(fits.noise().max(least));
+                let is_enough = best.unevenness.lt(fits.noise().max(least));
+                let is_better = even & fits.there & !is_enough;
+                let bends = even & fits.there & is_enough;
+                if bends != 0 {
+                    let sides = [found, radii].map(|radii| radii + radii + one);
+                    let sides2 = sides[0] * sides[0] - sides[1] * sides[1];
+                    bend2.take(S::mask(bends), best.bend2(&fits, sides2, least));
+                }
                 found.take(S::mask(is_jagged | is_better), radii);
                 best.take(is_jagged | is_better, &fits);
                 let seven_tenths = radii * Floats::splat(7.0) / Floats::splat(10.0);
@@ -328,7 +357,7 @@ impl EvenTile<'_> {
                 windows[lane].radius = WAITS;
             }
             let there = zero.lt(found) & asked & !hidden;
-            write(&best, found, there, asked & !decided & !hidden, windows);
+            write(&best, found, bend2, there, asked & !decided & !hidden, windows);
             S::store(run.radii[group * GROUP..].as_mut_ptr(), found.0);
             CovarianceMatrix::note_sums(&best.sums, &mut run.sums, group * GROUP);
             (there, hidden)
@@ -409,11 +438,12 @@ impl EvenTile<'_> {
             let rounded = !((along + of_trace).lt(deep) | (deep + of_trace).lt(along))
                 | !is_deep & !is_none & !of_deviation.lt(allowed)
                 | !is_deep & !((seen + of_seen).lt(line) | (line + enough_seen).lt(seen));
-            let by_depth = Doubles::splat(1.0) / depth;
+            let inverse_depth = Doubles::splat(1.0) / depth;
             Fits {
                 sums: *sums,
                 q,
-                ray: [m[0] * by_depth, m[1] * by_depth, m[2] * by_depth],
+                ray: [m[0] * inverse_depth, m[1] * inverse_depth, m[2] * inverse_depth],
+                inverse_depth,
                 unevenness,
                 steepness_squared,
                 there: enough & (is_deep | line.lt(seen)),
@@ -460,6 +490,7 @@ impl EvenTile<'_> {
 unsafe fn write<S: Groups>(
     fits: &Fits<S>,
     radii: Floats<S>,
+    bend2: Floats<S>,
     there: u32,
     asked: u32,
     windows: &mut [EvenWindow],
@@ -472,14 +503,13 @@ unsafe fn write<S: Groups>(
         // As `even_window` has it.
         let (one, points) = (Floats::splat(1.0), fits.points().narrow());
         let side = Floats::splat(2.0) * radii + one;
-        let per_bend = one / (side * side);
-        let per_noise = Floats::splat(12.0) / points * per_bend;
+        let per_noise = Floats::splat(12.0) / points / (side * side);
         let ([a, b, c], [x, y, z]) = (q, ray);
         let steepness = steepness_squared.narrow().sqrt();
         let fours = [
             [radii, a.narrow(), b.narrow(), c.narrow()],
             [x.narrow(), y.narrow(), z.narrow(), steepness],
-            [unevenness.narrow(), fits.noise().narrow(), per_noise, per_bend],
+            [unevenness.narrow(), fits.noise().narrow(), per_noise, bend2],
         ];
         let to = found.as_mut_ptr().cast::<f32>();
         for (fields, place) in fours.into_iter().zip((0..).step_by(4)) {
