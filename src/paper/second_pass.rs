@@ -389,7 +389,7 @@ fn sample_radius(
         let other = sizes[pixels[corner]];
         size = if other > 0.0 && other < size { other } else { size };
     }
-    radius_of_size(size, options).max(1)
+    radius_of_size(size, options).min(options.paper.largest_radius / 2).max(1)
 }
 
 /// The size that the window of a pixel of this depth has far from any depth change, as [`Windows`] has them but for
