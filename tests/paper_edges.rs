@@ -139,6 +139,51 @@ fn the_second_pass_keeps_creases_sharp() {
     }
 }
 
+/// Stairs whose steps are finer than the windows, in which normals are all alike: seen from 1.2 m above the floor.
+#[test]
+fn the_second_pass_sees_steps_finer_than_windows() {
+    let (width, height, focal) = (120, 240, 525.0);
+    let [rise, run, floor] = [0.17, 0.28, 1.2];
+    // The depth along a ray, and whether it is that of a tread; the first of all, as nothing is in front of it.
+    let hit = |slope: f64, first: f64| {
+        let steps = (0..).map(|step| (first + run * f64::from(step), rise * f64::from(step)));
+        for (z, up) in steps {
+            if (floor - up - rise..=floor - up).contains(&(slope * z)) {
+                return (z, false);
+            }
+            let tread = (floor - up - rise) / slope;
+            if (z..z + run).contains(&tread) {
+                return (tread, true);
+            }
+        }
+        unreachable!("stairs without end")
+    };
+    for (first, bound) in [(2.5, 5.0), (3.0, 21.0)] {
+        // From the second step on.
+        let bottom = (floor - rise) / first;
+        let of_rows: Vec<_> =
+            (0..height).map(|y| hit(bottom - (height - y) as f64 / focal, first)).collect();
+        let point = |at: usize| {
+            let (x, y) = (at % width, at / width);
+            let slope = bottom - (height - y) as f64 / focal;
+            let z = of_rows[y].0;
+            [(x as f64 - 60.0) / focal * z, slope * z, z].map(|c| c as f32)
+        };
+        let points: Vec<_> = (0..width * height).map(point).collect();
+        for method in [Method::CovarianceMatrix, Method::Average3DGradient] {
+            let normals = normals(&points, width, options(method, true, true));
+            let angle = |(at, normal): (usize, &[f32; 3])| {
+                let axis = if of_rows[at / width].1 { 1 } else { 2 };
+                f64::from(-normal[axis]).clamp(-1.0, 1.0).acos()
+            };
+            let sum: f64 = normals.iter().enumerate().map(angle).sum();
+            let mean = (sum / normals.len() as f64).to_degrees();
+            println!("{first} m, {method:?}: {mean:.2} deg");
+            assert!(mean <= bound, "{first} m, {method:?}: {mean} deg");
+        }
+    }
+}
+
 #[test]
 fn the_second_pass_leaves_smooth_surfaces_as_they_are() {
     for name in ["plane", "sphere", "cylinder"] {

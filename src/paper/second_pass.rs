@@ -371,7 +371,8 @@ fn find_wanted(
 }
 
 /// The radius of the window with which the normal of a block is looked at: the smallest one that its middle pixel or a
-/// corner has, the least there is where the middle has no window; 0 where it has no point.
+/// corner has, the least there is where the middle has no window, and at most half the largest, as normals of fine relief are
+/// alike in larger ones; 0 where it has no point.
 fn sample_radius(
     sizes: &[f32],
     cloud: &Cloud,
