@@ -465,9 +465,9 @@ impl<S: Along> Found<'_, S> {
             least = Floats::splat(CREASE_COST) * least;
             let first = windows;
             for (number, candidates) in found.iter().enumerate() {
+                let these = Windows::load(&candidates.windows);
                 let cost = Floats(candidates.cost.load::<S>());
                 let is_better = S::lt(cost.0, least.0);
-                let these = Windows::load(&candidates.windows);
                 let crease = Crease::between(&these, &first, noise);
                 let better = S::and(is_better, crease.is_first_side(pixels.ray));
                 // Mostly none is.
@@ -854,7 +854,8 @@ impl Rows {
     }
 
     /// The pixels of so many blocks, at most one for each lane, whose first columns are these, in a `row` of blocks: lanes
-    /// without one take no window. Depths have this `noise`; pixels of the mask `exact` count alone. They are written in place, as there are kilobytes.
+    /// without one take no window. Depths have this `noise`; pixels of the mask `exact` count alone. They are written in place,
+    /// as there are kilobytes.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
