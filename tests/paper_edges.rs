@@ -161,13 +161,12 @@ fn the_second_pass_sees_steps_finer_than_windows() {
     for (first, bound) in [(2.5, 5.0), (3.0, 21.0)] {
         // From the second step on.
         let bottom = (floor - rise) / first;
-        let of_rows: Vec<_> =
-            (0..height).map(|y| hit(bottom - (height - y) as f64 / focal, first)).collect();
+        let slope = |y: usize| bottom - (height - y) as f64 / focal;
+        let of_rows: Vec<_> = (0..height).map(|y| hit(slope(y), first)).collect();
         let point = |at: usize| {
             let (x, y) = (at % width, at / width);
-            let slope = bottom - (height - y) as f64 / focal;
             let z = of_rows[y].0;
-            [(x as f64 - 60.0) / focal * z, slope * z, z].map(|c| c as f32)
+            [(x as f64 - 60.0) / focal * z, slope(y) * z, z].map(|c| c as f32)
         };
         let points: Vec<_> = (0..width * height).map(point).collect();
         for method in [Method::CovarianceMatrix, Method::Average3DGradient] {
@@ -212,9 +211,13 @@ fn the_second_pass_leaves_round_objects_as_they_are() {
         for shape in [ball, pole] {
             let exact = Scene { shapes: vec![shape.clone()] }.render(&camera);
             let much = if pixels < 50.0 { 1.35 } else { 1.12 };
-            for (noise, times) in
-                [(Noise::None, 1.02), (Noise::Khoshelham, 1.1), (Noise::Nguyen, much)]
-            {
+            // Nguyen's noise leaves holes, beside which the second pass finds a normal here and there.
+            let cases = [
+                (Noise::None, 1.02, 0.0),
+                (Noise::Khoshelham, 1.1, 0.0),
+                (Noise::Nguyen, much, 2e-4),
+            ];
+            for (noise, times, more) in cases {
                 let frame = noise.apply(&exact, &mut Random::new(1));
                 for method in [Method::CovarianceMatrix, Method::Average3DGradient] {
                     let [single, second] = [false, true].map(|creases| {
@@ -223,7 +226,8 @@ fn the_second_pass_leaves_round_objects_as_they_are() {
                     });
                     let what = format!("{pixels} px, {noise:?}, {method:?}, {shape:?}");
                     println!("{what}: {:.3} of {:.3} deg", second.mean, single.mean);
-                    assert!(second.coverage >= single.coverage, "{what}");
+                    let gained = second.coverage - single.coverage;
+                    assert!((0.0..=more).contains(&gained), "{what}: {gained}");
                     assert!(second.mean <= times * single.mean, "{what}");
                 }
             }

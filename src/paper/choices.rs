@@ -43,8 +43,8 @@ impl EvenWindow {
     }
 
     /// What one of a mean square deviation that is not noise costs.
-    pub fn per_misfit(radius: f32) -> f32 {
-        let side = 2.0 * radius + 1.0;
+    fn per_misfit(&self) -> f32 {
+        let side = 2.0 * self.radius + 1.0;
         MISFIT / (side * side)
     }
 }
@@ -151,7 +151,7 @@ impl<'a> Candidates<'a> {
         found.is_exact = exact > EXACT_SHARE * found.windows.len() as f32;
         for Candidate { window, cost, .. } in &mut found.windows {
             let misfit = (window.unevenness - found.noise).max(0.0);
-            *cost = found.noise * window.per_noise + misfit * EvenWindow::per_misfit(window.radius);
+            *cost = found.noise * window.per_noise + misfit * window.per_misfit();
         }
         found
     }
@@ -247,10 +247,10 @@ impl<'a> Candidates<'a> {
         let plane = inverse_depth_along(window.q, pixel.ray);
         let astray = pixel.near.inverse_depth - plane;
         let astray = (astray * astray - pixel.near.noise).max(0.0);
-        let short = (length([x - dx, y - dy]) - window.radius).max(0.0);
         let (dx, dy) = (x - dx, y - dy);
+        let short = (length([dx, dy]) - window.radius).max(0.0);
         let even = even + window.bend2 * (dx * dx + dy * dy);
-        let cost = (even + astray * EvenWindow::per_misfit(window.radius)) * (1.0 + short * short);
+        let cost = (even + astray * window.per_misfit()) * (1.0 + short * short);
         let lies_in =
             || (pixel.inverse_depth - plane).abs() < pixel.tolerance + JITTER * window.steepness;
         if short == 0.0 || lies_in() { cost } else { f32::INFINITY }
