@@ -7,10 +7,10 @@ use crate::distance::distance_map;
 use crate::eigenvalues::eigenvalue_map;
 use crate::memory::{refill, table};
 use crate::methods::{Estimate, estimate_window, start};
-use crate::options::{Method, Options, Semantics};
+use crate::options::{Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
 use crate::paper::{
-    self, Asked, Blocks, Cloud, DepthChanges, EvenWindows, Marks, PaperMaps, Windows,
+    self, Asked, Cloud, DepthChanges, EvenWindows, Marks, PaperMaps, Windows, even_window,
 };
 use crate::smoothing_area::window_side;
 use crate::threads::Workers;
@@ -124,28 +124,12 @@ impl paper::Engine for PlainEngine<'_> {
         found: &mut Windows,
     ) -> Result<(), Error> {
         let Windows { even, of_even, .. } = found;
-        refill(even, paper::even_windows(cloud, asked))?;
-        if self.options.method == Method::CovarianceMatrix {
-            let radii = table(even.iter().map(|window| window.radius as u32))?;
-            self.of_blocks(&asked.blocks, &radii, of_even)?;
-        }
-        Ok(())
+        let found = table((0..asked.blocks.count()).map(|block| even_window(cloud, asked, block)))?;
+        refill(even, found.iter().map(|(window, _)| *window))?;
+        refill(of_even, found.iter().map(|(_, estimate)| *estimate))
     }
 
     fn choices(&mut self, even: &EvenWindows, choices: &mut [u32]) {
         even.choose(choices);
-    }
-
-    fn of_blocks(
-        &mut self,
-        blocks: &Blocks,
-        radii: &[u32],
-        estimates: &mut Vec<[f32; 4]>,
-    ) -> Result<(), Error> {
-        let &mut PlainEngine { points, options, .. } = self;
-        let of_block = |block: usize| {
-            paper::of_radius(points, options, blocks.middle(block), radii[block]).into()
-        };
-        refill(estimates, (0..blocks.count()).map(of_block))
     }
 }

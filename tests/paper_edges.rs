@@ -46,6 +46,14 @@ fn normals(points: &[[f32; 3]], width: usize, options: Options) -> Vec<[f32; 3]>
     normals
 }
 
+/// Between two directions, in radians: small ones too, which a cosine does not tell.
+fn angle(a: [f32; 3], b: [f32; 3]) -> f64 {
+    let (a, b) = (a.map(f64::from), b.map(f64::from));
+    let minor = |i: usize, j: usize| a[i] * b[j] - a[j] * b[i];
+    let sine = minor(1, 2).hypot(minor(2, 0)).hypot(minor(0, 1));
+    sine.atan2((0..3).map(|i| a[i] * b[i]).sum())
+}
+
 /// Mean angle to the truth in degrees, and share of the points with a normal.
 struct Score {
     mean: f64,
@@ -64,9 +72,7 @@ fn score(frame: &Frame, normals: &[[f32; 3]], counts: impl Fn(usize) -> bool) ->
             continue;
         }
         found += 1.0;
-        let truth = frame.normals[at];
-        let cosine: f64 = (0..3).map(|i| f64::from(normal[i]) * f64::from(truth[i])).sum();
-        sum += cosine.clamp(-1.0, 1.0).acos().to_degrees();
+        sum += angle(*normal, frame.normals[at]).to_degrees();
     }
     assert!(found > 500.0, "{found} normals of {points} points");
     Score { mean: sum / found, coverage: found / points }
@@ -210,11 +216,11 @@ fn the_second_pass_leaves_round_objects_as_they_are() {
         let pole = Shape::Cylinder { base, axis, radius };
         for shape in [ball, pole] {
             let exact = Scene { shapes: vec![shape.clone()] }.render(&camera);
-            let much = if pixels < 50.0 { 1.35 } else { 1.12 };
+            let much = if pixels < 30.0 { 1.2 } else { 1.03 };
             // Nguyen's noise leaves holes, beside which the second pass finds a normal here and there.
             let cases = [
                 (Noise::None, 1.02, 0.0),
-                (Noise::Khoshelham, 1.1, 0.0),
+                (Noise::Khoshelham, 1.05, 0.0),
                 (Noise::Nguyen, much, 2e-4),
             ];
             for (noise, times, more) in cases {
@@ -239,8 +245,7 @@ fn the_second_pass_leaves_round_objects_as_they_are() {
                 });
                 let what = format!("{pixels} px, radius {radius}, {shape:?}");
                 println!("{what}: {:.3} of {:.3} deg", second.mean, single.mean);
-                let times = if pixels < 30.0 { 1.6 } else { 1.2 };
-                assert!(second.mean <= times * single.mean, "{what}");
+                assert!(second.mean <= 1.05 * single.mean, "{what}");
             }
         }
     }

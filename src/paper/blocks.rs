@@ -52,15 +52,6 @@ impl Blocks {
         (middle(column * BLOCK, BLOCK, self.width), middle(row * BLOCK, BLOCK, self.height))
     }
 
-    /// The numbers of the pixels of the block in a column and row of blocks; the last ones inside the image stand for those
-    /// that are cut off.
-    #[inline(always)]
-    pub fn pixels(&self, (column, row): (usize, usize)) -> [usize; BLOCK * BLOCK] {
-        let x = |at: usize| (column * BLOCK + at % BLOCK).min(self.width - 1);
-        let y = |at: usize| (row * BLOCK + at / BLOCK).min(self.height - 1);
-        std::array::from_fn(|at| y(at) * self.width + x(at))
-    }
-
     /// The block that a pixel is in.
     pub fn block(&self, pixel: usize) -> usize {
         pixel / self.width / BLOCK * self.across + pixel % self.width / BLOCK

@@ -74,7 +74,7 @@ impl Cloud {
         resize(&mut self.points, self.width * self.height + BLOCK - 1, [f32::NAN; 3])?;
         resize(&mut self.depths, self.width * self.height, f32::NAN)?;
         let blocks = Blocks::of(self.width, self.height).count();
-        let summed = if options.crease_windows { blocks } else { 0 };
+        let summed = if options.has_second_pass() { blocks } else { 0 };
         resize(&mut self.sums, summed, [0.0; 4])
     }
 

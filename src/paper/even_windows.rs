@@ -1,14 +1,15 @@
 //! Even windows: around every block's middle pixel the largest window whose points lie in one plane as well as chance
-//! allows.
+//! allows. The normal is that plane's.
 //!
 //! A pixel beside a depth change or a crease is in the middle of no large window that lies on one surface, but it is
 //! at the edge or in the corner of some, which are the even windows of blocks nearby.
 
+use super::bends::BEND_REACH;
 use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::cloud::Cloud;
-use super::creases::BEND_REACH;
 use super::depth_change::Clean;
 use super::planes::Plane;
+use crate::methods::Estimate;
 use crate::rect::Rect;
 
 /// Inverse depths that deviate less than this many alpha from a plane are as good as in it.
@@ -58,6 +59,8 @@ pub(crate) struct Asked<'a> {
     pub limit: u32,
     /// The smallest variance that is told from none.
     pub least_noise: f32,
+    /// Whether estimates have a curvature.
+    pub has_curvature: bool,
 }
 
 impl Asked<'_> {
@@ -75,26 +78,48 @@ impl Asked<'_> {
         clean.min(most) / BLOCK
     }
 
+    /// What a block's window of this radius covers of the image.
+    fn rect(&self, block: usize, radius: u32, cloud: &Cloud) -> Rect {
+        let middle = self.blocks.middle(block);
+        Rect::around(middle, radius as usize, (cloud.width, cloud.height))
+    }
+
+    /// The estimate from a window with this plane.
+    fn estimate(&self, plane: &Plane, is_jagged: bool) -> [f32; 4] {
+        let found = if is_jagged { plane.estimate_in_space() } else { plane.estimate() };
+        let curvature = if self.has_curvature { found.curvature } else { f32::NAN };
+        Estimate { curvature, ..found }.into()
+    }
+
     /// The variance told from none where the sensor's smallest depth change is `alpha`.
     pub fn least_noise(alpha: f32) -> f32 {
         (EVEN * alpha).powi(2)
     }
 }
 
-/// The even windows of all blocks: the plain form.
-pub(crate) fn even_windows<'a>(
-    cloud: &'a Cloud,
-    asked: &'a Asked,
-) -> impl ExactSizeIterator<Item = EvenWindow> + 'a {
-    (0..asked.blocks.count()).map(|block| even_window(cloud, asked, block).unwrap_or_default())
+/// The even window of a block, and its estimate: the plain form.
+pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> (EvenWindow, [f32; 4]) {
+    let found = find_even_window(cloud, asked, block);
+    found.unwrap_or((EvenWindow::default(), Estimate::NONE.into()))
 }
 
-/// That of one block: the plain form.
-pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<EvenWindow> {
-    let pixel = asked.blocks.middle(block);
+/// The estimate of a block's even window, which has this radius: the plain form.
+pub(crate) fn estimate_of(
+    cloud: &Cloud,
+    asked: &Asked,
+    block: usize,
+    radius: u32,
+    is_jagged: bool,
+) -> [f32; 4] {
+    let plane = Plane::of(cloud, &asked.rect(block, radius, cloud));
+    plane.map_or(Estimate::NONE.into(), |plane| asked.estimate(&plane, is_jagged))
+}
+
+/// A block's even window and its estimate, if there is one.
+fn find_even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<(EvenWindow, [f32; 4])> {
     let clean = asked.clean.radii[block] as u32;
     let wanted = asked.wanted[block];
-    let rect = |radius: u32| Rect::around(pixel, radius as usize, (cloud.width, cloud.height));
+    let rect = |radius: u32| asked.rect(block, radius, cloud);
     let plane = |radius: u32| Plane::of(cloud, &rect(radius));
     let jagged = |radius: u32| {
         let (plane, rect) = (plane(radius)?, rect(radius));
@@ -104,7 +129,7 @@ pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<
         let is_jagged = plane.unevenness <= steep
             && f64::from(asked.least_noise) <= steep
             && plane.points >= JAGGED_POINTS * rect.area() as f64;
-        is_jagged.then_some((radius, plane, 0.0))
+        is_jagged.then_some((radius, plane))
     };
     let radii = std::iter::successors(Some(wanted), |radius| Some(radius * 7 / 10));
     let mut radii = radii.take_while(|radius| *radius > clean && *radius >= JAGGED_RADIUS);
@@ -113,7 +138,9 @@ pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<
         plane.unevenness * f64::from(1.0 + CHANCE * chance)
     };
     let least_noise = f64::from(asked.least_noise);
-    let (radius, plane, bend2) = radii.find_map(jagged).or_else(|| {
+    let found = radii.find_map(jagged);
+    let is_jagged = found.is_some();
+    let even = || {
         let mut radius = asked.largest(block).min(clean);
         let mut found = plane(radius)?;
         while radius > 1
@@ -127,10 +154,11 @@ pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<
             (radius, found) = (radius / 2, half);
         }
         Some((radius, found, 0.0))
-    })?;
+    };
+    let (radius, plane, bend2) = found.map(|(radius, plane)| (radius, plane, 0.0)).or_else(even)?;
     let (radius, points) = (radius as f32, plane.points as f32);
     let side = 2.0 * radius + 1.0;
-    Some(EvenWindow {
+    let window = EvenWindow {
         radius,
         q: plane.q.map(|q| q as f32),
         ray: plane.ray.map(|ray| ray as f32),
@@ -139,5 +167,6 @@ pub(crate) fn even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<
         noise: noise(&plane) as f32,
         per_noise: 12.0 / points / (side * side),
         bend2: bend2 as f32,
-    })
+    };
+    Some((window, asked.estimate(&plane, is_jagged)))
 }

@@ -2,13 +2,13 @@
 //! at creases, both also on top of PCL's windows.
 //!
 //! The steps, in their plain forms, are `depth_change`, `distance`, `smoothing_area` and `methods`. The second pass is
-//! `second_pass`, with `creases`, `even_windows`, `choices` and `surroundings`. What the steps share is that a
+//! `second_pass`, with `bends`, `even_windows`, `choices` and `surroundings`. What the steps share is that a
 //! pixel's window is a rectangle inside the image, and that a method turns the points in a rectangle into a normal.
 
+mod bends;
 mod blocks;
 mod choices;
 mod cloud;
-mod creases;
 mod depth_change;
 mod distance;
 mod even_windows;
@@ -28,12 +28,12 @@ pub(crate) use choices::{
 pub(crate) use cloud::{Cleaned, Cloud};
 pub(crate) use depth_change::{DepthChanges, between};
 pub(crate) use even_windows::{
-    Asked, CHANCE, EvenWindow, JAGGED, JAGGED_LINES, JAGGED_POINTS, JAGGED_RADIUS, even_window,
-    even_windows,
+    Asked, CHANCE, EvenWindow, JAGGED, JAGGED_LINES, JAGGED_POINTS, JAGGED_RADIUS, estimate_of,
+    even_window,
 };
 pub(crate) use marks::{Marks, WORD, from as marks_from, mark, word_of};
 pub(crate) use methods::estimate as plain_estimate;
-pub(crate) use planes::{JITTER, Plane, inverse_depth};
+pub(crate) use planes::{JITTER, Plane, estimate_in_space, inverse_depth};
 pub(crate) use second_pass::{Engine, SecondPass, Windows};
 pub(crate) use smoothing_area::window;
 pub(crate) use summed_area::{ROUNDING, SummedArea};

@@ -6,7 +6,8 @@
 //! which are much the same in a window; and it is made from the moments that CM sums up (Eq. 16-25).
 
 use super::cloud::Cloud;
-use crate::eigen::{Scatter, Symmetric3};
+use crate::eigen::{Scatter, Symmetric3, eigen};
+use crate::methods::Estimate;
 use crate::rect::Rect;
 use crate::vector::dot;
 
@@ -25,6 +26,7 @@ pub(crate) struct Plane {
     pub unevenness: f64,
     /// How much the inverse depth changes from pixel to pixel along the steepest direction, squared; 0 there.
     pub steepness_squared: f64,
+    covariance: Symmetric3,
 }
 
 impl Plane {
@@ -78,7 +80,23 @@ impl Plane {
             points: n,
             unevenness: if is_deep { f64::INFINITY } else { deviation2 / depth2 },
             steepness_squared: if is_deep { 0.0 } else { slope2 * angle2 },
+            covariance,
         })
+    }
+
+    /// Its normal, not turned, and as curvature what the points vary across it, as a share of how they vary.
+    pub fn estimate(&self) -> Estimate {
+        let share = 1.0 / dot(self.q, self.q).sqrt();
+        let normal = self.q.map(|q| q * share);
+        let across = dot(normal, self.covariance.times(normal));
+        let curvature = (across / self.covariance.trace()) as f32;
+        Estimate { normal: normal.map(|c| c as f32), curvature }
+    }
+
+    /// The same of the plane to which the points are nearest in space: where they are astray along the rows and columns, not
+    /// along their rays alone, that is nearer to the truth.
+    pub fn estimate_in_space(&self) -> Estimate {
+        estimate_in_space(&self.covariance)
     }
 
     /// How much the slope of the surface changes from pixel to pixel, squared, as far as it is not chance: told from how far
@@ -92,6 +110,13 @@ impl Plane {
         let bend = 24.0 / sides2;
         off2 * bend * bend
     }
+}
+
+/// [`Plane::estimate_in_space`], of points of this covariance matrix.
+pub(crate) fn estimate_in_space(covariance: &Symmetric3) -> Estimate {
+    let (values, normal) = eigen(covariance);
+    let curvature = (values[0] / covariance.trace()) as f32;
+    Estimate { normal: normal.map(|c| c as f32), curvature }
 }
 
 /// NaN at a missing point, and at depth 0.

@@ -3,25 +3,24 @@
 use std::iter::repeat_n;
 use std::ops::Range;
 
+use super::bends::{BEND_REACH, Bends};
 use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::choices::{EvenWindows, NO_WINDOW};
 use super::cloud::Cloud;
-use super::creases::{BEND_REACH, SummedNormals};
 use super::depth_change::DepthChanges;
 use super::even_windows::{Asked, EvenWindow};
 use super::marks::{Marks, WORD, word_of};
-use super::{is_depth_change, of_radius, rect_around, smoothing_area, surroundings, window};
+use super::{is_depth_change, of_radius, smoothing_area, surroundings};
 use crate::Error;
 use crate::cloud::Points;
 use crate::memory::{bytes, refill, resize};
 use crate::methods::Estimate;
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
-use crate::rect::Rect;
 use crate::threads::Workers;
 
-/// How windows and their estimates are computed: by the plain forms, or fast. Estimates are normals, turned to the
-/// viewpoint, and curvatures.
+/// How windows and their estimates are computed: by the plain forms, or fast. Estimates are normals, not turned, and
+/// curvatures.
 pub(crate) trait Engine {
     /// The threads.
     fn workers(&self) -> &Workers;
@@ -32,8 +31,8 @@ pub(crate) trait Engine {
     /// The depth changes of a cloud.
     fn find_depth_changes(&self, changes: &mut DepthChanges, cloud: &Cloud) -> Result<(), Error>;
 
-    /// The even windows of all blocks; with their estimates if the method is CM. It may write the estimates of the pixels
-    /// that are not `concerned` along with them.
+    /// The even windows of all blocks, and their estimates. It may write those of the pixels that are not `concerned` along
+    /// with them.
     fn even_windows(
         &mut self,
         cloud: &Cloud,
@@ -44,14 +43,6 @@ pub(crate) trait Engine {
 
     /// The block whose window each pixel takes, or [`NO_WINDOW`].
     fn choices(&mut self, even: &EvenWindows, choices: &mut [u32]);
-
-    /// The estimates of windows around blocks' middle pixels, for the blocks that have one, by their radii.
-    fn of_blocks(
-        &mut self,
-        blocks: &Blocks,
-        radii: &[u32],
-        estimates: &mut Vec<[f32; 4]>,
-    ) -> Result<(), Error>;
 }
 
 /// The windows, and what they give.
@@ -79,17 +70,19 @@ pub(crate) struct SecondPass {
     /// As [`Asked`] has them.
     wanted: Vec<u32>,
     windows: Windows,
-    normals: SummedNormals,
+    bends: Bends,
     /// As [`EvenWindows`] has them.
     concerned: Marks,
     levels: Vec<u8>,
     choices: Vec<u32>,
-    /// Those of windows around the blocks' middle pixels whose estimates are asked for, 0 for none.
-    radii: Vec<u32>,
 }
 
 /// As often as a radius can be halved.
 const EVERY_LEVEL: u8 = u32::BITS as u8;
+
+/// On a round surface a window beside a pixel is worth more than its own only where that is less than this share of what the
+/// depth asks for.
+const SMALL_ON_ROUND: f32 = 1.0 / 3.0;
 
 /// A crease does not bound the windows next to it as a depth change does: of the sizes that are tried, these many.
 const CREASE_LEVELS: u8 = 3;
@@ -100,11 +93,10 @@ impl SecondPass {
         self.depth_changes.size()
             + bytes(&self.wanted)
             + self.windows.size()
-            + self.normals.size()
+            + self.bends.size()
             + self.concerned.size()
             + bytes(&self.levels)
             + bytes(&self.choices)
-            + bytes(&self.radii)
     }
 
     /// Finds which even windows the pixels of other points take, and their estimates.
@@ -114,9 +106,7 @@ impl SecondPass {
         options: &Options,
         engine: &mut impl Engine,
     ) -> Result<(), Error> {
-        let SecondPass {
-            depth_changes, wanted, windows, normals, concerned, levels, radii, ..
-        } = self;
+        let SecondPass { depth_changes, wanted, windows, bends, concerned, levels, .. } = self;
         engine.sizes(&mut windows.sizes)?;
         if !options.has_second_pass() {
             return refill(&mut self.choices, repeat_n(NO_WINDOW, cloud.depths.len()));
@@ -134,43 +124,23 @@ impl SecondPass {
         let blocks = Blocks::of(cloud.width, cloud.height);
         find_wanted(wanted, cloud, &blocks, options, engine.workers())?;
         let least_noise = Asked::least_noise(options.paper.alpha);
-        let asked = Asked { blocks, wanted, clean, limit, least_noise };
-        if options.crease_windows {
-            let radius = |block| sample_radius(&windows.sizes, cloud, &blocks, block, options);
-            normals.sum_points(cloud, options.paper.alpha, &blocks, engine.workers())?;
-            if options.is_cm_of_paper() {
-                // They vary as much as CM's normals do, and need none of its sums. The other methods' own normals, and those
-                // of PCL's windows, tell more.
-                normals.sum_gradients(cloud, &blocks, radius, engine.workers())?;
-            } else {
-                refill(radii, (0..blocks.count()).map(|block| radius(blocks.place(block))))?;
-                engine.of_blocks(&blocks, radii, &mut windows.of_even)?;
-                normals.sum(&windows.of_even, &blocks, engine.workers())?;
-            }
-            normals.find_bends(&blocks, |block| asked.clean_blocks(block), engine.workers())?;
-        }
+        let has_curvature = options.method == Method::CovarianceMatrix;
+        let asked = Asked { blocks, wanted, clean, limit, least_noise, has_curvature };
+        // PCL's AVERAGE_DEPTH_CHANGE is farther off on round surfaces than windows beside the pixel are.
+        let is_off =
+            options.semantics == Semantics::Pcl && options.method == Method::AverageDepthChange;
+        let reach = |block| if is_off { 0 } else { asked.clean_blocks(block) };
+        bends.find(cloud, options.paper.alpha, &blocks, reach, engine.workers())?;
         concerned.clear(size)?;
         refill(levels, repeat_n(0, blocks.count()))?;
-        let concern = Concern { cloud, options, asked: &asked, sizes: &windows.sizes, normals };
+        let concern = Concern { cloud, options, asked: &asked, sizes: &windows.sizes, bends };
         concern.find(concerned, levels, engine.workers());
         resize(&mut self.choices, cloud.depths.len(), NO_WINDOW)?;
         engine.even_windows(cloud, &asked, concerned, windows)?;
-        // From here on CM needs no more memory: something may have been written.
-        let of_even = &mut windows.of_even;
-        let windows = &windows.even;
+        // From here on no more memory is needed: something may have been written.
+        let Windows { even: windows, of_even, .. } = windows;
         let even = EvenWindows { cloud, asked: &asked, options, concerned, levels, windows };
         engine.choices(&even, &mut self.choices);
-        if options.method != Method::CovarianceMatrix {
-            refill(radii, repeat_n(0, blocks.count()))?;
-            // Marked first, as many pixels take the same.
-            for block in self.choices.iter().filter(|choice| **choice != NO_WINDOW) {
-                radii[*block as usize] = 1;
-            }
-            for (block, radius) in radii.iter_mut().enumerate().filter(|(_, taken)| **taken > 0) {
-                *radius = even.radius(block);
-            }
-            engine.of_blocks(&blocks, radii, of_even)?;
-        }
         // A window may have no normal: but for rare ones, those that no pixel takes.
         let has_none = |block: usize| of_even[block][0].is_nan();
         if (0..blocks.count()).any(|block| even.radius(block) > 0 && has_none(block)) {
@@ -197,7 +167,7 @@ impl SecondPass {
         &self.concerned
     }
 
-    /// The estimates of the even windows that pixels take, turned to the viewpoint from the blocks' middle pixels.
+    /// The estimates of the even windows, block by block.
     pub fn of_even(&self) -> &[[f32; 4]] {
         &self.windows.of_even
     }
@@ -252,7 +222,7 @@ struct Concern<'a> {
     asked: &'a Asked<'a>,
     /// As [`Windows`] has them.
     sizes: &'a [f32],
-    normals: &'a SummedNormals,
+    bends: &'a Bends,
 }
 
 impl Concern<'_> {
@@ -278,60 +248,52 @@ impl Concern<'_> {
         concerned: &mut [u64; BLOCK],
         levels: &mut [u8],
     ) {
-        let &Concern { cloud, options, sizes, .. } = self;
+        let &Concern { cloud, options, asked, bends, .. } = self;
         let columns = word * WORD..cloud.width.min((word + 1) * WORD);
-        let lines = row * BLOCK..cloud.height.min((row + 1) * BLOCK);
-        let pixels = |y: usize| y * cloud.width + columns.start..y * cloud.width + columns.end;
+        let mut lines = [const { 0..0 }; BLOCK];
+        for (line, y) in lines.iter_mut().zip(row * BLOCK..cloud.height) {
+            *line = y * cloud.width + columns.start..y * cloud.width + columns.end;
+        }
+        let any = |of_lines: &[u64; BLOCK]| of_lines.iter().fold(0, |any, marks| any | marks);
+        let mut small = 0;
         if options.one_sided_windows {
-            for (concerned, y) in concerned.iter_mut().zip(lines.clone()) {
-                *concerned = self.with_small_windows(pixels(y));
+            *concerned = lines.clone().map(|line| self.with_windows_below(1.0, line));
+            small = any(concerned);
+        }
+        if options.crease_windows {
+            for (concerned, line) in concerned.iter_mut().zip(&lines) {
+                *concerned |= self.with_windows(line);
             }
         }
-        let is_one_sided = concerned.iter().fold(0, |any, line| any | line);
-        let mut beside_creases = 0;
+        let (some, mut round) = (any(concerned), 0);
         for (block, level) in levels.iter_mut().enumerate() {
             let of_block = ((1 << BLOCK) - 1) << (block * BLOCK);
-            *level = if is_one_sided & of_block != 0 { EVERY_LEVEL } else { 0 };
-            let column = columns.start / BLOCK + block;
-            if options.crease_windows && self.is_beside_crease((column, row)) {
-                beside_creases |= of_block;
-                *level = CREASE_LEVELS.max(*level);
+            let place = (columns.start / BLOCK + block, row);
+            if some & of_block != 0 {
+                *level = if small & of_block != 0 { EVERY_LEVEL } else { CREASE_LEVELS };
+                round |= if bends.is_round(&asked.blocks, place) { of_block } else { 0 };
             }
         }
-        if beside_creases != 0 {
-            for (concerned, y) in concerned.iter_mut().zip(lines) {
-                let have_windows = word_of(sizes[pixels(y)].iter().map(|size| *size > 0.0));
-                *concerned |= beside_creases & have_windows;
+        if round != 0 {
+            for (concerned, line) in concerned.iter_mut().zip(lines) {
+                *concerned &= !round | self.with_windows_below(SMALL_ON_ROUND, line);
             }
         }
     }
 
-    /// The marks of the pixels whose windows are smaller than their depths ask for.
-    fn with_small_windows(&self, pixels: Range<usize>) -> u64 {
+    /// The marks of the pixels that have a window.
+    fn with_windows(&self, pixels: &Range<usize>) -> u64 {
+        word_of(self.sizes[pixels.clone()].iter().map(|size| *size > 0.0))
+    }
+
+    /// The marks of the pixels whose windows are smaller than this share of what their depths ask for.
+    fn with_windows_below(&self, share: f32, pixels: Range<usize>) -> u64 {
         let &Concern { cloud, sizes, .. } = self;
         // The loop's own: it is vectorized.
         let options = self.options.clone();
         let found = cloud.depths[pixels.clone()].iter().zip(&sizes[pixels]);
         // Sizes are whole numbers.
-        word_of(found.map(|(depth, size)| size + 1.0 <= wanted_size(*depth, &options)))
-    }
-
-    /// Whether normals vary strongly around a block whose surface is not round.
-    fn is_beside_crease(&self, block: (usize, usize)) -> bool {
-        self.normals_vary(block) && !self.normals.bend_alike(&self.asked.blocks, block)
-    }
-
-    /// Whether normals vary where the window of a block's middle pixel is, or else of its first one that has a window.
-    fn normals_vary(&self, block: (usize, usize)) -> bool {
-        let &Concern { cloud, options, asked: &Asked { blocks, .. }, sizes, normals } = self;
-        let (mut x, mut y) = blocks.middle_of(block);
-        let mut size = sizes[cloud.index(x, y)];
-        if size == 0.0 {
-            let has_window = |at: &usize| sizes[*at] > 0.0;
-            let Some(at) = blocks.pixels(block).into_iter().find(has_window) else { return false };
-            (x, y, size) = (at % cloud.width, at / cloud.width, sizes[at]);
-        }
-        normals.vary_in(&windows_of_block(cloud, options, (x, y), size))
+        word_of(found.map(|(depth, size)| size + 1.0 <= share * wanted_size(*depth, &options)))
     }
 }
 
@@ -370,29 +332,6 @@ fn find_wanted(
     Ok(())
 }
 
-/// The radius of the window with which the normal of a block is looked at: the smallest one that its middle pixel or a
-/// corner has, the least there is where the middle has no window, and at most half the largest, as normals of fine relief are
-/// alike in larger ones; 0 where it has no point.
-fn sample_radius(
-    sizes: &[f32],
-    cloud: &Cloud,
-    blocks: &Blocks,
-    block: (usize, usize),
-    options: &Options,
-) -> u32 {
-    let pixels = blocks.pixels(block);
-    let middle = pixels[MIDDLE * BLOCK + MIDDLE];
-    if cloud.is_missing(middle) {
-        return 0;
-    }
-    let mut size = sizes[middle];
-    for corner in [0, BLOCK - 1, BLOCK * (BLOCK - 1), BLOCK * BLOCK - 1] {
-        let other = sizes[pixels[corner]];
-        size = if other > 0.0 && other < size { other } else { size };
-    }
-    radius_of_size(size, options).min(options.paper.largest_radius / 2).max(1)
-}
-
 /// The size that the window of a pixel of this depth has far from any depth change, as [`Windows`] has them but for
 /// a fraction.
 fn wanted_size(depth: f32, options: &Options) -> f32 {
@@ -409,17 +348,4 @@ fn radius_of_size(size: f32, options: &Options) -> u32 {
         Semantics::Pcl => size as u32 / 2,
     };
     radius.min(options.paper.largest_radius)
-}
-
-/// What the windows of the pixels next to one, as many as are in a block, cover of the image, if they have its size, as
-/// [`Windows`] has them.
-fn windows_of_block(cloud: &Cloud, options: &Options, pixel: (usize, usize), size: f32) -> Rect {
-    let (width, height, size) = (cloud.width, cloud.height, size as usize);
-    match options.semantics {
-        Semantics::Paper => window(pixel, size + MIDDLE, width, height),
-        Semantics::Pcl => {
-            let side = size + 2 * MIDDLE;
-            rect_around(pixel, (side, side), (width, height))
-        }
-    }
 }

@@ -52,11 +52,13 @@ impl<const N: usize> SummedArea<N> {
     }
 
     /// The sums over the rectangles that end before row `y`, by the column that they end before.
+    #[inline(always)]
     pub fn row(&self, y: usize) -> &[[f64; N]] {
         &self.sums[y * self.stride..][..self.stride]
     }
 
     /// The sum over a rectangle (Eq. 3, not divided).
+    #[inline(always)]
     pub fn sum(&self, rect: &Rect) -> [f64; N] {
         let at = |x, y| &self.sums[y * self.stride + x];
         let (a, b) = (at(rect.x.start, rect.y.start), at(rect.x.end, rect.y.start));

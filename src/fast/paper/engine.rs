@@ -1,13 +1,11 @@
 //! What the second pass builds on, fast.
 
-use super::{Job, Own, choices, compute_of_blocks, even_windows, find_depth_changes, radii};
+use super::{Job, Own, choices, even_windows, find_depth_changes, radii};
 use crate::Error;
 use crate::cloud::Normals;
 use crate::fast::{Scratch, sides};
-use crate::memory::resize;
-use crate::methods::Estimate;
 use crate::options::{Method, Options, Semantics};
-use crate::paper::{Asked, Blocks, Cloud, DepthChanges, Engine, EvenWindows, Marks, Windows};
+use crate::paper::{Asked, Cloud, DepthChanges, Engine, EvenWindows, Marks, Windows};
 use crate::threads::Workers;
 
 /// The engine of one computation.
@@ -46,35 +44,15 @@ impl Engine for FastEngine<'_> {
         concerned: &Marks,
         found: &mut Windows,
     ) -> Result<(), Error> {
-        let method = Method::CovarianceMatrix;
-        let Windows { even, of_even, .. } = found;
-        let of_even = normals_of(of_even, &asked.blocks)?;
         let own = self.own.map(|(indices, normals)| Own { concerned, indices, normals });
-        let of_even = (self.job.options.method == method).then_some(&of_even);
         // CM's sums are what even windows are made from.
+        let method = Method::CovarianceMatrix;
         let options = &Options { method, ..self.job.options.clone() };
         let job = Job { options, ..self.job };
-        even_windows(&job, (cloud, asked), even, (of_even, own), self.scratch)
+        even_windows(&job, (cloud, asked), found, own, self.scratch)
     }
 
     fn choices(&mut self, even: &EvenWindows, found: &mut [u32]) {
         choices(self.job.isa, even, found, self.scratch);
     }
-
-    fn of_blocks(
-        &mut self,
-        blocks: &Blocks,
-        radii: &[u32],
-        estimates: &mut Vec<[f32; 4]>,
-    ) -> Result<(), Error> {
-        let normals = normals_of(estimates, blocks)?;
-        compute_of_blocks(&self.job, radii, &normals, self.scratch)
-    }
-}
-
-/// A view of the blocks' estimates.
-fn normals_of<'a>(estimates: &'a mut Vec<[f32; 4]>, blocks: &Blocks) -> Result<Normals<'a>, Error> {
-    resize(estimates, blocks.count(), Estimate::NONE.into())?;
-    let data = estimates.as_flattened_mut();
-    Normals::interleaved(data, blocks.across, blocks.down, 4, 0, Some(3))
 }

@@ -1,21 +1,20 @@
 //! Even windows, fast, for one tile of the image, eight blocks at a time: the plain form is in `paper::even_windows`. Their
-//! planes come from CM's integral images, as CM's normals of the windows and of the pixels' own do.
+//! planes come from CM's integral images, as CM's normals of the pixels' own windows do.
 
 use super::integrals::Rings;
 use super::layers::{Layer, Waiting, with_fraction};
 use super::methods::{CovarianceMatrix, MOMENTS};
 use super::rects::{Pixels, Rects, range};
 use super::tile::{Run, Tile};
+use crate::eigen::Symmetric3;
 use crate::fast::Parts;
 use crate::fast::arithmetic::{Doubles, Floats};
-use crate::fast::lanes::LANES;
-use crate::fast::moments::{Matrices, minor};
-use crate::fast::run::RUN;
+use crate::fast::moments::minor;
 use crate::fast::sink::Sink;
 use crate::fast::tile::{Bits, all};
 use crate::paper::{
     Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_LINES, JAGGED_POINTS, JAGGED_RADIUS,
-    MIDDLE, Plane, ROUNDING, even_window, middle,
+    MIDDLE, Plane, ROUNDING, estimate_in_space, estimate_of, even_window, middle,
 };
 use crate::simd::{GROUP, Groups};
 use crate::vector::dot;
@@ -23,6 +22,9 @@ use crate::vector::dot;
 /// A window is doubtful if rounding could change its variance, or the least that is told from none, by more than this
 /// share.
 const DOUBT: f64 = 0.02;
+
+/// And if the sums' rounding errors could turn its plane by more than about 1e-5.
+const DOUBT_TURN: f64 = 4e5;
 
 /// The radius of a window that waits for a layer with all its points.
 const WAITS: f32 = -1.0;
@@ -33,16 +35,13 @@ pub(super) struct Even<'a> {
     pub asked: &'a Asked<'a>,
     /// Block by block.
     pub windows: Parts<EvenWindow>,
-    /// For their normals, if they are asked for.
-    pub normals: Option<Sink<'a>>,
+    pub estimates: Parts<[f32; 4]>,
 }
 
 /// A rectangle of the image whose blocks' even windows are found together, and the normals of the pixels that may take none.
 pub(super) struct EvenTile<'a> {
     pub even: &'a Even<'a>,
     pub tile: Tile<'a>,
-    /// The same, of blocks.
-    pub blocks: Tile<'a>,
     /// For the pixels' normals, if they are asked for.
     pub sink: Option<&'a Sink<'a>>,
 }
@@ -62,15 +61,19 @@ struct Eight {
 /// The planes through the points of eight windows.
 #[derive(Clone, Copy)]
 struct Fits<S: Groups> {
-    sums: [Doubles<S>; MOMENTS],
+    points: Doubles<S>,
     q: [Doubles<S>; 3],
     ray: [Doubles<S>; 3],
     inverse_depth: Doubles<S>,
     unevenness: Doubles<S>,
     steepness_squared: Doubles<S>,
-    /// The lanes that have one, those in which rounding may have had a say, and those that hold hidden points.
+    /// The covariance matrix, its upper triangle.
+    covariance: [Doubles<S>; 6],
+    /// The lanes that have one, those in which rounding may have had a say in that or turned the plane, and those that hold
+    /// hidden points.
     there: u32,
     doubtful: u32,
+    turned: u32,
     hidden: u32,
 }
 
@@ -83,17 +86,18 @@ impl<S: Groups> Fits<S> {
     unsafe fn none() -> Self {
         // SAFETY: as the caller's.
         let [one, unevenness] = unsafe { [Doubles::splat(1.0), Doubles::splat(f64::INFINITY)] };
-        let (three, sums) = ([one; 3], [one; MOMENTS]);
-        let (there, doubtful, hidden) = (0, 0, 0);
+        let (there, doubtful, turned, hidden) = (0, 0, 0, 0);
         Fits {
-            sums,
-            q: three,
-            ray: three,
+            points: one,
+            q: [one; 3],
+            ray: [one; 3],
             inverse_depth: one,
             unevenness,
             steepness_squared: one,
+            covariance: [one; 6],
             there,
             doubtful,
+            turned,
             hidden,
         }
     }
@@ -101,9 +105,7 @@ impl<S: Groups> Fits<S> {
     /// Takes the planes of others in some lanes.
     #[inline(always)]
     fn take(&mut self, lanes: u32, others: &Self) {
-        for i in 0..MOMENTS {
-            self.sums[i].take(lanes, others.sums[i]);
-        }
+        self.points.take(lanes, others.points);
         for i in 0..3 {
             self.q[i].take(lanes, others.q[i]);
             self.ray[i].take(lanes, others.ray[i]);
@@ -111,12 +113,10 @@ impl<S: Groups> Fits<S> {
         self.inverse_depth.take(lanes, others.inverse_depth);
         self.unevenness.take(lanes, others.unevenness);
         self.steepness_squared.take(lanes, others.steepness_squared);
-    }
-
-    /// How many points there are.
-    #[inline(always)]
-    fn points(&self) -> Doubles<S> {
-        self.sums[3]
+        for i in 0..6 {
+            self.covariance[i].take(lanes, others.covariance[i]);
+        }
+        self.turned = self.turned & !lanes | others.turned & lanes;
     }
 
     /// The variance that the unevenness may be of.
@@ -127,7 +127,7 @@ impl<S: Groups> Fits<S> {
     unsafe fn noise(&self) -> Doubles<S> {
         // SAFETY: as the caller's.
         unsafe {
-            let chance = Floats::splat(2.0) / (self.points().narrow() - Floats::splat(3.0));
+            let chance = Floats::splat(2.0) / (self.points.narrow() - Floats::splat(3.0));
             let chance = Floats::splat(1.0) + Floats::splat(CHANCE) * chance.sqrt();
             self.unevenness * chance.widen()
         }
@@ -144,11 +144,91 @@ impl<S: Groups> Fits<S> {
             let off = dot(self.q, middle.ray) - middle.inverse_depth;
             let one = Doubles::splat(1.0);
             let noise =
-                self.unevenness.max(least_noise) * (one / middle.points() - one / self.points());
+                self.unevenness.max(least_noise) * (one / middle.points - one / self.points);
             let (zero, most) = (Doubles::splat(0.0), Doubles::splat(Plane::BEND_NOISE));
             let off2 = (off * off - most * noise.max(zero)).max(zero);
             let bend = Doubles::splat(24.0) / sides2.widen();
             (off2 * bend * bend).narrow()
+        }
+    }
+
+    /// Writes the windows of the lanes that are there, and none for the others that are asked for.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn write_windows(
+        &self,
+        radii: Floats<S>,
+        bend2: Floats<S>,
+        there: u32,
+        asked: u32,
+        windows: &mut [EvenWindow],
+    ) {
+        const { assert!(size_of::<EvenWindow>() == size_of::<[f32; 12]>()) };
+        let ([a, b, c], [x, y, z]) = (self.q, self.ray);
+        let mut found = [EvenWindow::default(); GROUP];
+        // SAFETY: as the caller's; a window is twelve floats.
+        unsafe {
+            // As `even_window` has it.
+            let (one, points) = (Floats::splat(1.0), self.points.narrow());
+            let side = Floats::splat(2.0) * radii + one;
+            let per_noise = Floats::splat(12.0) / points / (side * side);
+            let steepness = self.steepness_squared.narrow().sqrt();
+            let fours = [
+                [radii, a.narrow(), b.narrow(), c.narrow()],
+                [x.narrow(), y.narrow(), z.narrow(), steepness],
+                [self.unevenness.narrow(), self.noise().narrow(), per_noise, bend2],
+            ];
+            let to = found.as_mut_ptr().cast::<f32>();
+            for (fields, place) in fours.into_iter().zip((0..).step_by(4)) {
+                let fields = fields.map(|field| S::and(S::mask(there), field.0));
+                S::store_points(fields, 3, to.add(place), size_of::<EvenWindow>());
+            }
+        }
+        for lane in Bits(asked) {
+            windows[lane] = found[lane];
+        }
+    }
+
+    /// Writes their estimates: those in space in the lanes of `jagged` windows.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn write_estimates(
+        &self,
+        jagged: u32,
+        has_curvature: bool,
+        asked: u32,
+        estimates: &mut [[f32; 4]],
+    ) {
+        let mut found = [[0.0; 4]; GROUP];
+        // SAFETY: as the caller's; an estimate is four floats.
+        unsafe {
+            // As `Plane::estimate` has it.
+            let share = Doubles::splat(1.0) / dot(self.q, self.q).sqrt();
+            let normal = self.q.map(|q| q * share);
+            let [xx, .., yy, _, zz] = self.covariance;
+            let curvature = dot(normal, times(self.covariance, normal)) / (xx + yy + zz);
+            let [x, y, z, curvature] =
+                [normal[0], normal[1], normal[2], curvature].map(|field| field.narrow().0);
+            let to = found.as_mut_ptr().cast();
+            S::store_points([x, y, z, curvature], 3, to, size_of::<[f32; 4]>());
+            if jagged != 0 {
+                let mut matrices = [[0.0; GROUP]; 6];
+                for (to, from) in matrices.iter_mut().zip(self.covariance) {
+                    S::store_d(to.as_mut_ptr(), from.0);
+                }
+                for lane in Bits(jagged) {
+                    let [xx, xy, xz, yy, yz, zz] = matrices.each_ref().map(|field| field[lane]);
+                    found[lane] = estimate_in_space(&Symmetric3 { xx, xy, xz, yy, yz, zz }).into();
+                }
+            }
+        }
+        for lane in Bits(asked) {
+            let [x, y, z, curvature] = found[lane];
+            estimates[lane] = [x, y, z, if has_curvature { curvature } else { f32::NAN }];
         }
     }
 }
@@ -173,7 +253,7 @@ impl EvenTile<'_> {
         if sink.is_some() {
             tile.start_waiting(layer, waiting);
         }
-        let (mut of_pixels, mut of_even) = (Run::default(), Run::default());
+        let mut run = Run::default();
         let mut some_wait = false;
         for y in tile.rows.clone() {
             let first = y / BLOCK * BLOCK;
@@ -185,13 +265,12 @@ impl EvenTile<'_> {
             unsafe {
                 let error = tile.advance::<S, _, MOMENTS>(&method, rings, &mut next, y);
                 if let Some(sink) = sink {
-                    let run = &mut of_pixels;
                     tile.row::<S, CovarianceMatrix, MOMENTS, true>(
-                        rings, waiting, sink, run, y, error,
+                        rings, waiting, sink, &mut run, y, error,
                     );
                 }
                 if has_middles {
-                    some_wait |= self.row::<S>(rings, &mut of_even, first, error);
+                    some_wait |= self.row::<S>(rings, first, error);
                 }
             }
         }
@@ -204,59 +283,33 @@ impl EvenTile<'_> {
     /// # Safety
     /// As [`EvenTile::compute`]; the rings hold what the windows need.
     #[inline(always)]
-    unsafe fn row<S: Groups>(
-        &self,
-        rings: &Rings<MOMENTS>,
-        run: &mut Run<Matrices>,
-        first: usize,
-        error: f64,
-    ) -> bool {
-        let &Cloud { width, .. } = self.even.cloud;
-        let Tile { columns, step, .. } = &self.blocks;
-        let points = rings.around(rings.aimed.y);
+    unsafe fn row<S: Groups>(&self, rings: &Rings<MOMENTS>, first: usize, error: f64) -> bool {
+        let &Even { cloud, asked, .. } = self.even;
+        let (width, columns) = (cloud.width, &self.tile.columns);
         let is_later = !rings.layer.is_first;
         let mut some_wait = false;
-        for start in columns.clone().step_by(RUN * step) {
-            run.start = start;
-            run.lanes = [0; RUN / LANES];
-            let end = columns.end.min(start + RUN * step);
-            for (group, x) in (start..end).step_by(GROUP * step).enumerate() {
-                let block = self.even.asked.blocks.block(first * width + x);
-                let blocks = block..block + (end - x).div_ceil(*step).min(GROUP);
-                let pixels = Pixels { x: x + MIDDLE, step: *step, width };
-                // SAFETY: as the caller's.
-                unsafe {
-                    let windows = self.even.windows.part(blocks);
-                    let mut asked = all(windows.len());
-                    if is_later {
-                        asked = Bits(asked).which(|lane| windows[lane].radius == WAITS);
-                    }
-                    if asked == 0 {
-                        continue;
-                    }
-                    let eight = Eight { pixels, block, asked, error };
-                    let (found, hidden) = self.eight::<S>(rings, &eight, windows, run, group);
-                    some_wait |= hidden != 0;
-                    if self.even.normals.is_some() && found != 0 {
-                        let at = group * GROUP;
-                        run.lanes[at / LANES] |= found << (at % LANES);
-                        run.points.store::<S>(at, rings.points_of(&points, &pixels));
-                    }
+        for x in columns.clone().step_by(GROUP * BLOCK) {
+            let block = asked.blocks.block(first * width + x);
+            let blocks = block..block + (columns.end - x).div_ceil(BLOCK).min(GROUP);
+            let pixels = Pixels { x: x + MIDDLE, step: BLOCK, width };
+            // SAFETY: as the caller's.
+            unsafe {
+                let windows = self.even.windows.part(blocks.clone());
+                let mut asked = all(windows.len());
+                if is_later {
+                    asked = Bits(asked).which(|lane| windows[lane].radius == WAITS);
                 }
-            }
-            if let Some(sink) = &self.even.normals {
-                // SAFETY: as the caller's.
-                unsafe {
-                    self.blocks
-                        .finish::<S, CovarianceMatrix, MOMENTS>(sink, run, first, error, is_later);
+                if asked != 0 {
+                    let estimates = self.even.estimates.part(blocks);
+                    let eight = Eight { pixels, block, asked, error };
+                    some_wait |= self.eight::<S>(rings, &eight, windows, estimates);
                 }
             }
         }
         some_wait
     }
 
-    /// Finds the windows of eight blocks, and notes what their normals are made from, as the `group` of a run; returns the
-    /// lanes that have one, and those that wait for another layer.
+    /// Finds the windows of eight blocks, and their estimates; returns whether some wait for another layer.
     ///
     /// # Safety
     /// As [`EvenTile::row`].
@@ -266,9 +319,8 @@ impl EvenTile<'_> {
         rings: &Rings<MOMENTS>,
         eight: &Eight,
         windows: &mut [EvenWindow],
-        run: &mut Run<Matrices>,
-        group: usize,
-    ) -> (u32, u32) {
+        estimates: &mut [[f32; 4]],
+    ) -> bool {
         let Even { cloud, asked: of_image, .. } = self.even;
         let &Eight { pixels, block, asked, .. } = eight;
         let y = rings.aimed.y;
@@ -300,32 +352,15 @@ impl EvenTile<'_> {
             radii.take(S::mask(jagged), wanted);
             let (mut found, mut bend2) = (zero, zero);
             let mut best = Fits::<S>::none();
-            let (mut doubtful, mut hidden, mut decided) = (0, 0, 0);
+            let (mut jagged_found, mut doubtful, mut hidden) = (0, 0, 0);
             loop {
-                let mut todo = jagged | even;
+                let todo = jagged | even;
                 if todo == 0 {
-                    // What rounding could decide is left to the plain form.
-                    let mut plain = [0.0; GROUP];
-                    for lane in Bits(asked & doubtful & !hidden & !decided) {
-                        let window = even_window(cloud, of_image, block + lane);
-                        windows[lane] = window.unwrap_or_default();
-                        plain[lane] = windows[lane].radius;
-                        decided |= 1 << lane;
-                        todo |= u32::from(plain[lane] > 0.0) << lane;
-                    }
-                    radii = Floats::load(plain.as_ptr());
-                    found.take(S::mask(decided), radii);
-                    if todo == 0 {
-                        break;
-                    }
+                    break;
                 }
                 let rects = Rects::new(rings, &pixels, radii, todo, None);
                 let sums = rects.sums(rings, 0);
                 let fits = self.fits(rings.layer.origin, &sums, eight.error);
-                if decided != 0 {
-                    best.take(todo, &fits);
-                    break;
-                }
                 doubtful |= fits.doubtful & todo;
                 if hides_some {
                     hidden |= fits.hidden & todo;
@@ -341,6 +376,7 @@ impl EvenTile<'_> {
                 }
                 found.take(S::mask(is_jagged | is_better), radii);
                 best.take(is_jagged | is_better, &fits);
+                jagged_found |= is_jagged;
                 let seven_tenths = radii * Floats::splat(7.0) / Floats::splat(10.0);
                 let next = Floats(S::truncate(seven_tenths.0));
                 let half = Floats(S::truncate((radii * Floats::splat(0.5)).0));
@@ -356,11 +392,19 @@ impl EvenTile<'_> {
             for lane in Bits(asked & hidden) {
                 windows[lane].radius = WAITS;
             }
-            let there = zero.lt(found) & asked & !hidden;
-            write(&best, found, bend2, there, asked & !decided & !hidden, windows);
-            S::store(run.radii[group * GROUP..].as_mut_ptr(), found.0);
-            CovarianceMatrix::note_sums(&best.sums, &mut run.sums, group * GROUP);
-            (there, hidden)
+            let (there, asked) = (zero.lt(found), asked & !hidden);
+            best.write_windows(found, bend2, there, asked, windows);
+            best.write_estimates(jagged_found, of_image.has_curvature, asked, estimates);
+            // What rounding could decide is left to the plain form.
+            for lane in Bits(asked & doubtful) {
+                (windows[lane], estimates[lane]) = even_window(cloud, of_image, block + lane);
+            }
+            for lane in Bits(asked & there & best.turned & !doubtful) {
+                let (radius, is_jagged) =
+                    (windows[lane].radius as u32, jagged_found >> lane & 1 != 0);
+                estimates[lane] = estimate_of(cloud, of_image, block + lane, radius, is_jagged);
+            }
+            hidden != 0
         }
     }
 
@@ -438,16 +482,19 @@ impl EvenTile<'_> {
             let rounded = !((along + of_trace).lt(deep) | (deep + of_trace).lt(along))
                 | !is_deep & !is_none & !of_deviation.lt(allowed)
                 | !is_deep & !((seen + of_seen).lt(line) | (line + enough_seen).lt(seen));
+            let turns = Doubles::splat(DOUBT_TURN * error) * share * half_trace;
             let inverse_depth = Doubles::splat(1.0) / depth;
             Fits {
-                sums: *sums,
+                points: n,
                 q,
                 ray: [m[0] * inverse_depth, m[1] * inverse_depth, m[2] * inverse_depth],
                 inverse_depth,
                 unevenness,
                 steepness_squared,
+                covariance: [xx, xy, xz, yy, yz, zz],
                 there: enough & (is_deep | line.lt(seen)),
                 doubtful: enough & rounded,
+                turned: !turns.lt(spread),
                 hidden: with_fraction(n),
             }
         }
@@ -472,53 +519,13 @@ impl EvenTile<'_> {
             let (across, down) = (side(pixels.columns(), radii, width), side(row, radii, height));
             let most = Doubles::splat(JAGGED);
             let lines = Doubles::splat(JAGGED_LINES) * across.max(down).widen();
-            let mut jagged = fits.points() / lines;
+            let mut jagged = fits.points / lines;
             jagged.take(most.lt(jagged), most);
             let steep = jagged * jagged * fits.steepness_squared;
             let fewest = Doubles::splat(JAGGED_POINTS) * (across * down).widen();
             let least = Doubles::splat(self.even.asked.least_noise.into());
-            !steep.lt(fits.unevenness) & !steep.lt(least) & !fits.points().lt(fewest)
+            !steep.lt(fits.unevenness) & !steep.lt(least) & !fits.points.lt(fewest)
         }
-    }
-}
-
-/// Writes the windows of the lanes that are there, and none for the others that are asked for.
-///
-/// # Safety
-/// The processor has the instruction set of `S`.
-#[inline(always)]
-unsafe fn write<S: Groups>(
-    fits: &Fits<S>,
-    radii: Floats<S>,
-    bend2: Floats<S>,
-    there: u32,
-    asked: u32,
-    windows: &mut [EvenWindow],
-) {
-    const { assert!(size_of::<EvenWindow>() == size_of::<[f32; 12]>()) };
-    let &Fits { q, ray, unevenness, steepness_squared, .. } = fits;
-    let mut found = [EvenWindow::default(); GROUP];
-    // SAFETY: as the caller's; a window is twelve floats.
-    unsafe {
-        // As `even_window` has it.
-        let (one, points) = (Floats::splat(1.0), fits.points().narrow());
-        let side = Floats::splat(2.0) * radii + one;
-        let per_noise = Floats::splat(12.0) / points / (side * side);
-        let ([a, b, c], [x, y, z]) = (q, ray);
-        let steepness = steepness_squared.narrow().sqrt();
-        let fours = [
-            [radii, a.narrow(), b.narrow(), c.narrow()],
-            [x.narrow(), y.narrow(), z.narrow(), steepness],
-            [unevenness.narrow(), fits.noise().narrow(), per_noise, bend2],
-        ];
-        let to = found.as_mut_ptr().cast::<f32>();
-        for (fields, place) in fours.into_iter().zip((0..).step_by(4)) {
-            let fields = fields.map(|field| S::and(S::mask(there), field.0));
-            S::store_points(fields, 3, to.add(place), size_of::<EvenWindow>());
-        }
-    }
-    for lane in Bits(asked) {
-        windows[lane] = found[lane];
     }
 }
 

@@ -40,10 +40,11 @@ use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::memory::{bytes, make_room, refill, resize};
+use crate::methods::Estimate;
 use crate::options::{DistanceMetric, Method, Options};
 use crate::paper::{
     Asked, BLOCK, Blocks, Cloud, DepthChanges, EvenWindow, EvenWindows, Marks, NO_WINDOW,
-    PaperMaps, SecondPass, WORD, is_depth_change, word_of,
+    PaperMaps, SecondPass, WORD, Windows, is_depth_change, word_of,
 };
 use crate::simd::{GROUP, Groups};
 use crate::threads::Workers;
@@ -72,7 +73,6 @@ pub(crate) struct Scratch {
     radii: Buffer<f32>,
     /// The largest of them.
     largest: usize,
-    radii_of_blocks: Buffer<f32>,
     chunks: Vec<Chunk>,
     /// The pixels that take even windows.
     taken: Marks,
@@ -81,9 +81,8 @@ pub(crate) struct Scratch {
 impl Scratch {
     /// Bytes held.
     pub fn size(&self) -> usize {
-        let Scratch { depths, ranges, radii, radii_of_blocks, chunks, taken, .. } = self;
-        let radii = radii.size() + radii_of_blocks.size();
-        depths.size() + bytes(ranges) + radii + bytes(chunks) + taken.size()
+        let Scratch { depths, ranges, radii, chunks, taken, .. } = self;
+        depths.size() + bytes(ranges) + radii.size() + bytes(chunks) + taken.size()
     }
 }
 
@@ -121,7 +120,7 @@ pub(crate) fn compute(
 ) -> Result<(), Error> {
     job.depths(scratch)?;
     job.radii(scratch)?;
-    job.tiles(scratch, indices, normals, scratch.paper.largest, 1, None)
+    job.tiles(scratch, indices, normals, None)
 }
 
 /// Reads the depths, and finds the radii of all pixels' windows, row by row, 0 for none.
@@ -155,7 +154,7 @@ pub(crate) fn compute_own(
             *word = word_of(choices.iter().map(|choice| *choice != NO_WINDOW));
         }
     });
-    let done = job.tiles(scratch, indices, normals, scratch.paper.largest, 1, Some(&taken));
+    let done = job.tiles(scratch, indices, normals, Some(&taken));
     scratch.paper.taken = taken;
     done
 }
@@ -176,18 +175,6 @@ pub(crate) fn write_chosen(
         // SAFETY: the processor has the instruction set, and every row falls to one thread.
         unsafe { paths::run(job.isa, row) };
     });
-}
-
-/// The normals of the blocks whose middle pixel has a window of one of these radii; NaN for the others. The depths have
-/// been read.
-fn compute_of_blocks(
-    job: &Job,
-    radii: &[u32],
-    normals: &Normals,
-    scratch: &mut super::Scratch,
-) -> Result<(), Error> {
-    let largest = job.radii_of_blocks(scratch, radii)?;
-    job.tiles(scratch, None, normals, largest, BLOCK, None)
 }
 
 /// Makes a cloud that of the job's points, as [`Cloud::read`].
@@ -248,24 +235,26 @@ struct Own<'a> {
     pub normals: &'a Normals<'a>,
 }
 
-/// The even windows of all blocks, and if they are asked for, their normals `of_even`, block by block, and in the paper's
-/// semantics pixels' `own`; the job's method is CM. The depths have been read, and the pixels' own windows are those that
-/// [`radii`] has found. Afterwards there is room for [`choices`].
+/// The even windows of all blocks and their estimates, and in the paper's semantics, if they are asked for, pixels' `own`;
+/// the job's method is CM. The depths have been read, and the pixels' own windows are those that [`radii`] has found.
+/// Afterwards there is room for [`choices`].
 fn even_windows(
     job: &Job,
     (cloud, asked): (&Cloud, &Asked),
-    windows: &mut Vec<EvenWindow>,
-    (of_even, own): (Option<&Normals>, Option<Own>),
+    found: &mut Windows,
+    own: Option<Own>,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
     for scratch in &scratch.each[..scratch.workers.count()] {
         lock(scratch).paper.choices.reserve(cloud.width, asked.limit)?;
     }
-    resize(windows, asked.blocks.count(), EvenWindow::default())?;
-    let largest = (0..windows.len()).map(|block| asked.largest(block)).max().unwrap_or(0) as usize;
-    let windows = Parts(windows.as_mut_ptr());
-    let normals = of_even.map(Sink::All);
-    job.even_tiles(scratch, &Even { cloud, asked, windows, normals }, own, largest)
+    let blocks = asked.blocks.count();
+    resize(&mut found.even, blocks, EvenWindow::default())?;
+    resize(&mut found.of_even, blocks, Estimate::NONE.into())?;
+    let largest = (0..blocks).map(|block| asked.largest(block)).max().unwrap_or(0) as usize;
+    let windows = Parts(found.even.as_mut_ptr());
+    let estimates = Parts(found.of_even.as_mut_ptr());
+    job.even_tiles(scratch, &Even { cloud, asked, windows, estimates }, own, largest)
 }
 
 /// The block whose even window each pixel takes, or [`NO_WINDOW`].
@@ -379,7 +368,7 @@ pub(crate) struct Job<'a> {
 
 // The stages are not inlined: profiles and the test of instruction counts tell them by name.
 impl Job<'_> {
-    /// All rows of depths, for [`even_windows`] and [`compute_of_blocks`] too.
+    /// All rows of depths, for [`even_windows`] too.
     #[inline(never)]
     pub fn depths(&self, scratch: &mut super::Scratch) -> Result<(), Error> {
         let &Job { points, options, .. } = self;
@@ -448,58 +437,36 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// Takes over radii of blocks; gives the largest.
-    fn radii_of_blocks(&self, scratch: &mut super::Scratch, given: &[u32]) -> Result<usize, Error> {
-        let radii = &mut scratch.paper.radii_of_blocks;
-        let Blocks { across, down, .. } = Blocks::of(self.points.width(), self.points.height());
-        let length = row_length(across);
-        radii.grow(down * length)?;
-        for (to, from) in radii.chunks_mut(length).zip(given.chunks(across)) {
-            for (to, from) in to.iter_mut().zip(from) {
-                *to = *from as f32;
-            }
-        }
-        Ok(given.iter().max().map_or(0, |largest| *largest as usize))
+    /// A row's depths, and the radii of its windows.
+    fn row<'s>(&self, scratch: &'s Scratch, y: usize) -> (&'s [f32], &'s [f32]) {
+        let length = row_length(self.points.width());
+        let Scratch { depths, radii, chunks, .. } = scratch;
+        // All chunks but the last have as many own rows.
+        let place = chunks[y / chunks[0].own.len()].place(y);
+        (&depths[y * length..][..length], &radii[place * length..][..length])
     }
 
-    /// A row's depths, and the radii of the windows of the blocks of `step` x `step` pixels that start in it.
-    fn row<'s>(&self, scratch: &'s Scratch, step: usize, y: usize) -> (&'s [f32], &'s [f32]) {
-        let width = self.points.width();
-        let [length, length_of_radii] = [width, width.div_ceil(step)].map(row_length);
-        let Scratch { depths, radii, radii_of_blocks, chunks, .. } = scratch;
-        let radii = if step == 1 {
-            // All chunks but the last have as many own rows.
-            &radii[chunks[y / chunks[0].own.len()].place(y) * length..]
-        } else {
-            &radii_of_blocks[y / step * length_of_radii..]
-        };
-        (&depths[y * length..][..length], &radii[..length_of_radii])
-    }
-
-    /// The normals of the middle pixels of blocks of `step` x `step` pixels, tile by tile, as [`Tile`] has them; no window's
-    /// radius is above `largest`.
+    /// The normals, tile by tile, of the pixels that are not left out.
     #[inline(never)]
     fn tiles(
         &self,
         scratch: &mut super::Scratch,
         indices: Option<&[i32]>,
         normals: &Normals,
-        largest: usize,
-        step: usize,
         left_out: Option<&Marks>,
     ) -> Result<(), Error> {
         let &Job { points, options, .. } = self;
         let super::Scratch { workers, each, listed, paper, .. } = scratch;
-        let (width, height) = (points.width(), points.height());
+        let (width, height, largest) = (points.width(), points.height(), paper.largest);
         let sink = Sink::new(normals, indices, width, listed)?;
-        let row = &|y: usize| self.row(paper, step, y);
+        let row = &|y: usize| self.row(paper, y);
         let grid = Grid::new(width, height, largest, column(options.method));
         let limit = options.paper.largest_radius;
         let room = grid.room(limit, elements_of_rings);
         for scratch in &each[..workers.count()] {
             let WorkerScratch { moments, gradients, depth_changes, waiting, .. } =
                 &mut lock(scratch).paper;
-            waiting.reserve(width.div_ceil(step), grid.rows.div_ceil(step))?;
+            waiting.reserve(width, grid.rows)?;
             match options.method {
                 Method::CovarianceMatrix => moments.reserve(room)?,
                 Method::AverageDepthChange => {
@@ -511,7 +478,7 @@ impl Job<'_> {
         }
         workers.for_each(grid.count(), |worker, item| {
             let Some((columns, rows)) = grid.tile(item) else { return };
-            let tile = Tile { points, options, columns, rows, largest, step, row, left_out };
+            let tile = Tile { points, options, columns, rows, largest, row, left_out };
             let scratch = &mut lock(&each[worker]).paper;
             let (tile, sink) = (&tile, &sink);
             let WorkerScratch { moments, gradients, depth_changes, waiting, .. } = scratch;
@@ -523,7 +490,6 @@ impl Job<'_> {
                 Method::AverageDepthChange => {
                     self.layer(SmoothedDepthChanges, tile, layer, depth_changes, waiting, sink)
                 }
-                // The paper has no SIMPLE_3D_GRADIENT: second passes on PCL's semantics take this instead.
                 Method::Average3DGradient | Method::Simple3DGradient => {
                     self.layer(Gradients, tile, layer, gradients, waiting, sink)
                 }
@@ -571,7 +537,7 @@ impl Job<'_> {
         let sink = own.map(|own| Sink::new(own.normals, own.indices, width, listed)).transpose()?;
         let length = row_length(width);
         let row = &|y: usize| match sink {
-            Some(_) => self.row(paper, 1, y),
+            Some(_) => self.row(paper, y),
             None => (&paper.depths[y * length..][..length], &[][..]),
         };
         let grid = Grid::new(width, height, largest, Rings::<MOMENTS>::COLUMN);
@@ -583,10 +549,8 @@ impl Job<'_> {
         }
         workers.for_each(grid.count(), |worker, item| {
             let Some((columns, rows)) = grid.tile(item) else { return };
-            let step = 1;
-            let tile = Tile { points, options, columns, rows, largest, step, row, left_out };
-            let blocks = Tile { step: BLOCK, left_out: None, ..tile.clone() };
-            let tile = EvenTile { even, blocks, tile, sink: sink.as_ref() };
+            let tile = Tile { points, options, columns, rows, largest, row, left_out };
+            let tile = EvenTile { even, tile, sink: sink.as_ref() };
             let WorkerScratch { moments: rings, waiting, .. } = &mut lock(&each[worker]).paper;
             each_layer(&tile.tile, &paper.ranges, |layer| {
                 let tile = &tile;
@@ -748,7 +712,6 @@ impl Task for ChoicesTask<'_, '_> {
 mod tests {
     use super::*;
     use crate::options::Semantics;
-    use crate::paper::of_radius;
 
     #[test]
     fn clouds_are_read_as_in_the_plain_form() {
@@ -812,49 +775,6 @@ mod tests {
                         .unwrap();
                     let [found, expected] = [found, expected].map(|changes| format!("{changes:?}"));
                     assert_eq!(found, expected, "{isa:?} {semantics:?} {width} x {height}");
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn blocks_have_the_normals_of_the_plain_form() {
-        let height = 30;
-        for (isa, width) in Isa::ALL.into_iter().flat_map(|isa| (40..44).map(move |w| (isa, w))) {
-            if !isa.is_available() {
-                continue;
-            }
-            let point = |i: usize| {
-                let (x, y) = ((i % width) as f32 - 20.0, (i / width) as f32 - 15.0);
-                let z = 1.0 + 0.004 * x + 0.002 * y + 0.0001 * x * x;
-                [x * z / 60.0, y * z / 60.0, if i % 37 == 5 { f32::NAN } else { z }]
-            };
-            let values: Vec<_> = (0..width * height).flat_map(point).collect();
-            let points = Points::interleaved(&values, width, height, 3, 0).unwrap();
-            let mut options = Options { semantics: Semantics::Paper, ..Options::default() };
-            let blocks = Blocks::of(width, height);
-            let radii: Vec<_> = (0..blocks.count()).map(|block| block as u32 % 7).collect();
-            for method in
-                [Method::CovarianceMatrix, Method::Average3DGradient, Method::AverageDepthChange]
-            {
-                options.method = method;
-                let job = Job { isa, points: &points, options: &options };
-                let mut scratch = super::super::Scratch::default();
-                job.depths(&mut scratch).unwrap();
-                let mut found = vec![0.0; 4 * blocks.count()];
-                let (across, down) = (blocks.across, blocks.down);
-                let normals =
-                    Normals::interleaved(&mut found, across, down, 4, 0, Some(3)).unwrap();
-                compute_of_blocks(&job, &radii, &normals, &mut scratch).unwrap();
-                for (block, found) in found.chunks(4).enumerate() {
-                    let pixel = blocks.middle(block);
-                    let expected = of_radius(&points, &options, pixel, radii[block]).normal;
-                    for (found, expected) in found.iter().zip(expected) {
-                        let is_near = (found - expected).abs() < 1e-4;
-                        let both_none = found.is_nan() && expected.is_nan();
-                        let what = format!("{isa:?} {method:?} {width}: {block}");
-                        assert!(is_near || both_none, "{what}: {found} for {expected}");
-                    }
                 }
             }
         }

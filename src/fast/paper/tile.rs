@@ -17,7 +17,7 @@ use crate::fast::tile::{Bits, Estimates, all, from_middle};
 use crate::methods::Estimate;
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
-use crate::paper::{Cleaned, Marks, marks_from, middle, plain_estimate, window};
+use crate::paper::{Cleaned, Marks, marks_from, plain_estimate, window};
 use crate::rect::Rect;
 use crate::simd::{GROUP, Groups};
 
@@ -30,8 +30,6 @@ pub(crate) struct Tile<'a> {
     pub rows: Range<usize>,
     /// How far a window reaches from its pixel at most.
     pub largest: usize,
-    /// Columns and rows of the blocks whose middle pixels get the normals, 1 or `BLOCK`; the tile starts with one.
-    pub step: usize,
     /// A row's depths, and the radii of its windows, if it has normals: 0 for none. Both can be read up to a whole group.
     pub row: &'a (dyn Fn(usize) -> (&'a [f32], &'a [f32]) + Sync),
     /// Pixels that are not written.
@@ -59,11 +57,10 @@ impl Tile<'_> {
         let mut next = unsafe { self.start::<S, M, N>(rings, layer) };
         self.start_waiting(layer, waiting);
         let mut run = Run::default();
-        for y in self.rows.clone().step_by(self.step) {
+        for y in self.rows.clone() {
             // SAFETY: as the caller's.
             unsafe {
-                let middle = middle(y, self.step, self.points.height());
-                let error = self.advance::<S, M, N>(method, rings, &mut next, middle);
+                let error = self.advance::<S, M, N>(method, rings, &mut next, y);
                 self.row::<S, M, N, PARTIAL>(rings, waiting, sink, &mut run, y, error);
             }
         }
@@ -93,8 +90,7 @@ impl Tile<'_> {
     #[inline(always)]
     pub fn start_waiting(&self, layer: &Layer, waiting: &mut Waiting) {
         if layer.is_first {
-            let [columns, rows] = [&self.columns, &self.rows].map(|all| self.blocks(all.len()));
-            waiting.start(columns, rows);
+            waiting.start(self.columns.len(), self.rows.len());
         }
     }
 
@@ -171,29 +167,28 @@ impl Tile<'_> {
         y: usize,
         error: f64,
     ) {
-        let (width, height) = (self.points.width(), self.points.height());
+        let width = self.points.width();
         let layer = rings.layer;
         let radii = (self.row)(y).1;
         let left_out = self.left_out.map(|marks| marks.row(y));
-        let step = self.step;
-        let points = rings.around(middle(y, step, height));
+        let points = rings.around(y);
         let mut rows = Rows::new(rings, 0, M::EDGE);
-        for start in self.columns.clone().step_by(RUN * step) {
+        for start in self.columns.clone().step_by(RUN) {
             run.start = start;
             [run.lanes, run.left_out, run.few] = [[0; RUN / LANES]; 3];
-            let own = [self.block(start - self.columns.start), self.block(y - self.rows.start)];
+            let own = [start - self.columns.start, y - self.rows.start];
             let is_later = PARTIAL && !layer.is_first;
             let asked =
                 if is_later { *waiting.run(own[0], own[1]) } else { [u32::MAX; RUN / LANES] };
             let mut hidden = [0; RUN / LANES];
-            let end = self.columns.end.min(start + RUN * step);
-            for (group, x) in (start..end).step_by(GROUP * step).enumerate() {
+            let end = self.columns.end.min(start + RUN);
+            for (group, x) in (start..end).step_by(GROUP).enumerate() {
                 let at = group * GROUP;
-                let count = self.blocks(end - x).min(GROUP);
-                let pixels = Pixels { x: x + step / 2, step, width };
+                let count = (end - x).min(GROUP);
+                let pixels = Pixels { x, step: 1, width };
                 // SAFETY: as the caller's; the rings hold what the windows of the tile's pixels need.
                 unsafe {
-                    let eight = S::load(radii[self.block(x)..].as_ptr());
+                    let eight = S::load(radii[x..].as_ptr());
                     let (pair, shift) = (at / LANES, at % LANES);
                     let out = left_out.map_or(0, |row| marks_from(row, x) as u32 & all(GROUP));
                     run.left_out[pair] |= out << shift;
@@ -208,10 +203,7 @@ impl Tile<'_> {
                     // Behind the last column radii mean nothing.
                     let eight = S::and(S::mask(windows), eight);
                     S::store(run.radii[at..][..GROUP].as_mut_ptr(), eight);
-                    let rects = {
-                        let last = (step == 1).then_some(&mut rows);
-                        Rects::new(rings, &pixels, Floats(eight), windows, last)
-                    };
+                    let rects = Rects::new(rings, &pixels, Floats(eight), windows, Some(&mut rows));
                     let sums = rects.sums(rings, M::EDGE);
                     if PARTIAL && layer.hides_some() {
                         let lanes = with_hidden::<S, M, N>(&sums, &rects, rings, windows)
@@ -241,13 +233,12 @@ impl Tile<'_> {
         }
     }
 
-    /// Writes the normals of a run in row `y`, or in the blocks that start there; in a later layer, only those of the pixels
-    /// that waited for it.
+    /// Writes the normals of a run in row `y`; in a later layer, only those of the pixels that waited for it.
     ///
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    pub unsafe fn finish<S: Groups, M: Sums<N>, const N: usize>(
+    unsafe fn finish<S: Groups, M: Sums<N>, const N: usize>(
         &self,
         sink: &Sink,
         run: &mut Run<M::OfRun>,
@@ -255,20 +246,17 @@ impl Tile<'_> {
         error: f64,
         is_later: bool,
     ) {
-        let step = self.step;
-        let end = self.columns.end.min(run.start + RUN * step);
-        let columns = self.columns_of_blocks();
+        let end = self.columns.end.min(run.start + RUN);
         let (mut rest, mut any_rest) = ([0; RUN / LANES], 0);
         // SAFETY: as the caller's.
         unsafe {
             run.sums.solve::<S>(0, &run.lanes);
-            for (pair, x) in (run.start..end).step_by(LANES * step).enumerate() {
+            for (pair, x) in (run.start..end).step_by(LANES).enumerate() {
                 let (at, windows) = (pair * LANES, run.lanes[pair]);
-                let count = self.blocks(end - x).min(LANES);
+                let count = (end - x).min(LANES);
                 let written = if is_later { windows } else { all(count) & !run.left_out[pair] };
-                let place = (self.block(x), self.block(y));
                 if windows == 0 {
-                    sink.write::<S::Pair>(place, written, &Estimates::NONE, &columns);
+                    sink.write::<S::Pair>((x, y), written, &Estimates::NONE, &self.columns);
                     continue;
                 }
                 let found = M::estimate::<S::Pair>(&run.sums, at, error);
@@ -276,7 +264,7 @@ impl Tile<'_> {
                 any_rest |= rest[pair];
                 let here = run.points.load::<S::Pair>(at);
                 let normals = Estimates::of(found, here, self.options.viewpoint, windows);
-                sink.write::<S::Pair>(place, written, &normals, &columns);
+                sink.write::<S::Pair>((x, y), written, &normals, &self.columns);
             }
             if any_rest == 0 {
                 return;
@@ -303,12 +291,12 @@ impl Tile<'_> {
         doubtful: u32,
         error: f64,
     ) {
-        let (step, at) = (self.step, pair * LANES);
+        let at = pair * LANES;
         let (width, height) = (self.points.width(), self.points.height());
         let cleaned = Cleaned::new(self.points, self.options);
         let Run { start, radii, sums, points, few, .. } = run;
-        let x = *start + at * step;
-        let pixel = |lane: usize| (middle(x + lane * step, step, width), middle(y, step, height));
+        let x = *start + at;
+        let pixel = |lane: usize| (x + lane, y);
         let rect = |lane: usize| window(pixel(lane), radii[at + lane] as usize, width, height);
         // SAFETY: as the caller's.
         unsafe {
@@ -327,27 +315,8 @@ impl Tile<'_> {
             for lane in Bits(plain) {
                 normals.put(lane, self.plain(&cleaned, pixel(lane), &rect(lane)));
             }
-            let (place, columns) = ((self.block(x), self.block(y)), self.columns_of_blocks());
-            sink.write::<S::Pair>(place, doubtful, &normals, &columns);
+            sink.write::<S::Pair>((x, y), doubtful, &normals, &self.columns);
         }
-    }
-
-    /// How many blocks so many pixels in a row or a column are in.
-    #[inline(always)]
-    fn blocks(&self, pixels: usize) -> usize {
-        self.block(pixels + self.step - 1)
-    }
-
-    /// Which block a column or a row is in: by a shift, as steps are powers of two and divisions slow.
-    #[inline(always)]
-    fn block(&self, at: usize) -> usize {
-        at >> self.step.trailing_zeros()
-    }
-
-    /// The columns of the tile, in blocks.
-    #[inline(always)]
-    fn columns_of_blocks(&self) -> Range<usize> {
-        self.block(self.columns.start)..self.blocks(self.columns.end)
     }
 
     /// The plain form of one pixel.
