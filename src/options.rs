@@ -205,8 +205,9 @@ pub struct Options {
     /// surface that are not in line with it has a normal; default off. Takes the sensor's [`PaperOptions::alpha`] and
     /// [`PaperOptions::largest_radius`] in either semantics.
     pub one_sided_windows: bool,
-    /// In a second pass moves windows off the places where the normals vary strongly but the surface is not round, so that
-    /// edges without a depth change stay sharp; default off. Takes the same two parameters in either semantics.
+    /// In a second pass gives every pixel, but on round surfaces, the window around or beside it that is worth most, so that edges
+    /// without a depth change stay sharp and flat surfaces become smoother; default off. Takes the same two parameters in
+    /// either semantics.
     pub crease_windows: bool,
 }
 

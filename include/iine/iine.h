@@ -641,9 +641,10 @@ int32_t iine_estimator_set_one_sided_windows(struct iine_estimator *estimator,
                                              int32_t one_sided_windows);
 
 /**
- * Whether a second pass moves windows off the places where the normals vary strongly but the surface is not round, so that
- * edges without a depth change stay sharp: 0 (the default) or 1. With either semantics; takes the sensor's alpha from
- * `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of `iine_estimator_set_paper_radii`.
+ * Whether a second pass gives every pixel, but on round surfaces, the window around or beside it that is worth most, so that
+ * edges without a depth change stay sharp and flat surfaces become smoother: 0 (the default) or 1. With either semantics;
+ * takes the sensor's alpha from `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of
+ * `iine_estimator_set_paper_radii`.
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
  *

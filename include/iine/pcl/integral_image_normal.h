@@ -462,9 +462,9 @@ namespace iine
         options_.one_sided_windows = one_sided_windows;
       }
 
-      /** \brief Set whether a second pass moves windows off the places where the normals vary strongly but the surface is not
-        * round, so that edges without a depth change stay sharp. With either semantics, and the alpha of \ref setPaperAlpha and
-        * the largest radius of \ref setPaperRadii. Not in PCL's class.
+      /** \brief Set whether a second pass gives every pixel, but on round surfaces, the window around or beside it that is worth
+        * most, so that edges without a depth change stay sharp and flat surfaces become smoother. With either semantics, and the
+        * alpha of \ref setPaperAlpha and the largest radius of \ref setPaperRadii. Not in PCL's class.
         * \param[in] crease_windows whether it does; default false
         */
       void
