@@ -543,6 +543,24 @@ TEST (DistanceMap, IsThereFromComputeToTheNextCloud)
   EXPECT_EQ (estimator.getDistanceMap (), nullptr);
 }
 
+TEST (DistanceMap, IsThereWithoutPixels)
+{
+  const Cloud::Ptr cloud = scene ();
+  for (auto policy : {Estimator::BORDER_POLICY_IGNORE, Estimator::BORDER_POLICY_MIRROR})
+  {
+    Estimator estimator;
+    estimator.setNormalEstimationMethod (Estimator::SIMPLE_3D_GRADIENT);
+    estimator.setBorderPolicy (policy);
+    estimator.setInputCloud (cloud);
+    estimator.setIndices (pcl::IndicesPtr (new pcl::Indices));
+    Normals normals;
+    estimator.compute (normals);
+    EXPECT_EQ (estimator.getLastStatus (), IINE_OK);
+    ASSERT_NE (estimator.getDistanceMap (), nullptr);
+    EXPECT_EQ (estimator.getDistanceMap ()[22 * 60 + 50], 6.0f);
+  }
+}
+
 TEST (PointNormal, UsesTheRectangleAndComputeDoesNot)
 {
   for (auto method : {Estimator::COVARIANCE_MATRIX, Estimator::AVERAGE_3D_GRADIENT, Estimator::AVERAGE_DEPTH_CHANGE,

@@ -137,7 +137,7 @@ impl SecondPass {
         concern.find(concerned, levels, engine.workers());
         resize(&mut self.choices, cloud.depths.len(), NO_WINDOW)?;
         engine.even_windows(cloud, &asked, concerned, windows)?;
-        // From here on no more memory is needed: something may have been written.
+        // From here on CM needs no more memory: something may have been written.
         let Windows { even: windows, of_even, .. } = windows;
         let even = EvenWindows { cloud, asked: &asked, options, concerned, levels, windows };
         engine.choices(&even, &mut self.choices);

@@ -549,6 +549,9 @@ namespace iine
         {
           has_maps_ = true;
           computed_options_ = options_;
+          // Without pixels it may go with BORDER_POLICY_MIRROR, but the maps do not.
+          if (options_.normal_estimation_method == SIMPLE_3D_GRADIENT)
+            computed_options_.border_policy = BORDER_POLICY_IGNORE;
           return;
         }
         for (auto &point : output)

@@ -394,7 +394,7 @@ impl EvenTile<'_> {
             }
             let (there, asked) = (zero.lt(found), asked & !hidden);
             best.write_windows(found, bend2, there, asked, windows);
-            best.write_estimates(jagged_found, of_image.has_curvature, asked, estimates);
+            best.write_estimates(jagged_found & asked, of_image.has_curvature, asked, estimates);
             // What rounding could decide is left to the plain form.
             for lane in Bits(asked & doubtful) {
                 (windows[lane], estimates[lane]) = even_window(cloud, of_image, block + lane);
