@@ -1,6 +1,9 @@
 //! Near depth edges and creases: errors by band on scenes with known normals, with one-sided and crease windows, and
 //! coverage on real frames where `IINE_TEST_DATA` has them.
 
+mod clouds;
+
+use clouds::angle;
 use iine::{Depth, Estimator, Method, Normals, Options, Points, Semantics};
 use iine_scenes::{
     Band, Camera, Distances, Frame, Noise, REAL_FRAMES, Random, Scene, Shape, real_frame, scene,
@@ -46,14 +49,6 @@ fn normals(points: &[[f32; 3]], width: usize, options: Options) -> Vec<[f32; 3]>
     normals
 }
 
-/// Between two directions, in radians: small ones too, which a cosine does not tell.
-fn angle(a: [f32; 3], b: [f32; 3]) -> f64 {
-    let (a, b) = (a.map(f64::from), b.map(f64::from));
-    let minor = |i: usize, j: usize| a[i] * b[j] - a[j] * b[i];
-    let sine = minor(1, 2).hypot(minor(2, 0)).hypot(minor(0, 1));
-    sine.atan2((0..3).map(|i| a[i] * b[i]).sum())
-}
-
 /// Mean angle to the truth in degrees, and share of the points with a normal.
 struct Score {
     mean: f64,
@@ -72,7 +67,7 @@ fn score(frame: &Frame, normals: &[[f32; 3]], counts: impl Fn(usize) -> bool) ->
             continue;
         }
         found += 1.0;
-        sum += angle(*normal, frame.normals[at]).to_degrees();
+        sum += angle(normal.map(f64::from), frame.normals[at].map(f64::from));
     }
     assert!(found > 500.0, "{found} normals of {points} points");
     Score { mean: sum / found, coverage: found / points }

@@ -8,7 +8,7 @@ use super::bends::BEND_REACH;
 use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::cloud::Cloud;
 use super::depth_change::Clean;
-use super::planes::Plane;
+use super::planes::{Plane, estimate_in_space};
 use crate::methods::Estimate;
 use crate::rect::Rect;
 
@@ -86,7 +86,7 @@ impl Asked<'_> {
 
     /// The estimate from a window with this plane.
     fn estimate(&self, plane: &Plane, is_jagged: bool) -> [f32; 4] {
-        let found = if is_jagged { plane.estimate_in_space() } else { plane.estimate() };
+        let found = if is_jagged { estimate_in_space(&plane.covariance) } else { plane.estimate() };
         let curvature = if self.has_curvature { found.curvature } else { f32::NAN };
         Estimate { curvature, ..found }.into()
     }

@@ -26,7 +26,7 @@ pub(crate) struct Plane {
     pub unevenness: f64,
     /// How much the inverse depth changes from pixel to pixel along the steepest direction, squared; 0 there.
     pub steepness_squared: f64,
-    covariance: Symmetric3,
+    pub covariance: Symmetric3,
 }
 
 impl Plane {
@@ -93,12 +93,6 @@ impl Plane {
         Estimate { normal: normal.map(|c| c as f32), curvature }
     }
 
-    /// The same of the plane to which the points are nearest in space: where they are astray along the rows and columns, not
-    /// along their rays alone, that is nearer to the truth.
-    pub fn estimate_in_space(&self) -> Estimate {
-        estimate_in_space(&self.covariance)
-    }
-
     /// How much the slope of the surface changes from pixel to pixel, squared, as far as it is not chance: told from how far
     /// the mean of the window's middle is off this plane. The square of the window's side is by `sides2` more than that of
     /// its middle.
@@ -112,7 +106,8 @@ impl Plane {
     }
 }
 
-/// [`Plane::estimate_in_space`], of points of this covariance matrix.
+/// As [`Plane::estimate`], but of the plane to which points of this covariance matrix are nearest in space: where they are
+/// astray along the rows and columns, not along their rays alone, that is nearer to the truth.
 pub(crate) fn estimate_in_space(covariance: &Symmetric3) -> Estimate {
     let (values, normal) = eigen(covariance);
     let curvature = (values[0] / covariance.trace()) as f32;

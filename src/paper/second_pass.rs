@@ -261,7 +261,7 @@ impl Concern<'_> {
             small = any(concerned);
         }
         if options.crease_windows {
-            for (concerned, line) in concerned.iter_mut().zip(&lines) {
+            for (concerned, line) in concerned.iter_mut().zip(lines.clone()) {
                 *concerned |= self.with_windows(line);
             }
         }
@@ -282,8 +282,8 @@ impl Concern<'_> {
     }
 
     /// The marks of the pixels that have a window.
-    fn with_windows(&self, pixels: &Range<usize>) -> u64 {
-        word_of(self.sizes[pixels.clone()].iter().map(|size| *size > 0.0))
+    fn with_windows(&self, pixels: Range<usize>) -> u64 {
+        word_of(self.sizes[pixels].iter().map(|size| *size > 0.0))
     }
 
     /// The marks of the pixels whose windows are smaller than this share of what their depths ask for.

@@ -4,7 +4,6 @@ use std::ops::Range;
 
 use super::layers::Layer;
 use super::presence::{Presence, Size};
-use super::rects::Pixels;
 use crate::Error;
 use crate::cloud::Points;
 use crate::fast::arithmetic::{Doubles, Floats};
@@ -233,48 +232,6 @@ impl<const N: usize> Rings<N> {
             above: self.fields(y + self.rows_of_points - 1),
             below: self.fields(y + 1),
             plane: self.stride,
-        }
-    }
-
-    /// A field of eight pixels' points, of a row that is held. Of blocks, the last one may be cut: the image's last column
-    /// stands for its middle.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    pub unsafe fn of_pixels<S: Groups>(
-        &self,
-        row: &Around,
-        field: usize,
-        &Pixels { x, step, width }: &Pixels,
-    ) -> Floats<S> {
-        if step == 1 {
-            // SAFETY: as the caller's.
-            return unsafe { row.at(self.place(x)).own(field) };
-        }
-        let first = row.own.wrapping_add(field * row.plane);
-        let mut eight = [0.0; GROUP];
-        for (lane, to) in eight.iter_mut().enumerate() {
-            let place = self.place((x + lane * step).min(width - 1));
-            // SAFETY: the pixels are in the tile, whose columns are held.
-            *to = unsafe { *first.wrapping_add(place) };
-        }
-        // SAFETY: as the caller's.
-        unsafe { Floats::load(eight.as_ptr()) }
-    }
-
-    /// x, y and z of eight pixels' points, as [`Rings::of_pixels`].
-    ///
-    /// # Safety
-    /// As there.
-    #[inline(always)]
-    pub unsafe fn points_of<S: Groups>(&self, row: &Around, pixels: &Pixels) -> [Floats<S>; 3] {
-        // SAFETY: as the caller's.
-        unsafe {
-            let x = self.of_pixels(row, 0, pixels);
-            let y = self.of_pixels(row, 1, pixels);
-            let z = self.of_pixels(row, 2, pixels);
-            [x, y, z]
         }
     }
 

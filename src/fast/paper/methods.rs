@@ -62,25 +62,6 @@ impl CovarianceMatrix {
     pub fn about([x, y, z]: [f32; 3]) -> Self {
         CovarianceMatrix { origin: [x.into(), y.into(), z.into()] }
     }
-
-    /// Notes what normals are made from, as [`Sums::note`].
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    pub unsafe fn note_sums<S: Groups>(
-        sums: &[Doubles<S>; MOMENTS],
-        run: &mut Matrices,
-        at: usize,
-    ) {
-        let [x, y, z, count, xx, yy, zz, xy, yz, xz] = *sums;
-        let sums = [x, y, z, xx, xy, xz, yy, yz, zz];
-        // SAFETY: as the caller's.
-        unsafe {
-            let share = Doubles::splat(1.0) / count;
-            run.note(&WindowMoments { sums, share }, at);
-        }
-    }
 }
 
 /// x, y, z, the number of points, xx, yy, zz, xy; yz, zx: eight and two, as sums are read.
@@ -130,8 +111,13 @@ impl Sums<MOMENTS> for CovarianceMatrix {
         run: &mut Matrices,
         at: usize,
     ) {
+        let [x, y, z, count, xx, yy, zz, xy, yz, xz] = *sums;
+        let sums = [x, y, z, xx, xy, xz, yy, yz, zz];
         // SAFETY: as the caller's.
-        unsafe { Self::note_sums(sums, run, at) }
+        unsafe {
+            let share = Doubles::splat(1.0) / count;
+            run.note(&WindowMoments { sums, share }, at);
+        }
     }
 
     #[inline(always)]

@@ -22,7 +22,6 @@ use crate::rect::Rect;
 use crate::simd::{GROUP, Groups};
 
 /// A rectangle of the image whose normals are computed together.
-#[derive(Clone)]
 pub(crate) struct Tile<'a> {
     pub points: &'a Points<'a>,
     pub options: &'a Options,
@@ -205,9 +204,10 @@ impl Tile<'_> {
                     S::store(run.radii[at..][..GROUP].as_mut_ptr(), eight);
                     let rects = Rects::new(rings, &pixels, Floats(eight), windows, Some(&mut rows));
                     let sums = rects.sums(rings, M::EDGE);
+                    let here = points.at(rings.place(x));
                     if PARTIAL && layer.hides_some() {
                         let lanes = with_hidden::<S, M, N>(&sums, &rects, rings, windows)
-                            | rings.of_pixels::<S>(&points, WEIGHT, &pixels).lt(Floats::splat(1.0));
+                            | here.own::<S>(WEIGHT).lt(Floats::splat(1.0));
                         hidden[pair] |= (windows & lanes) << shift;
                         run.lanes[pair] &= !(lanes << shift);
                     }
@@ -222,7 +222,7 @@ impl Tile<'_> {
                         }
                     }
                     M::note::<S>(&sums, &rects, rings, windows, &mut run.sums, at);
-                    run.points.store::<S>(at, rings.points_of(&points, &pixels));
+                    run.points.store::<S>(at, [here.own(0), here.own(1), here.own(2)]);
                 }
             }
             if PARTIAL {
