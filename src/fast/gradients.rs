@@ -8,7 +8,7 @@ use super::arithmetic::{Floats, Integers, between};
 use super::lanes::LANES;
 use super::planes::Frame;
 use super::run::{Noted, RUN};
-use super::tile::{Found, Pair};
+use super::tile::{Bits, Found, Pair, Tile};
 use crate::simd::{GROUP, Groups, Simd};
 use crate::vector::{cross, dot};
 
@@ -119,8 +119,27 @@ impl Gradients {
         }
     }
 
-    pub fn put(&mut self, at: usize, both: Both<f32>) {
-        self.0[at] = both;
+    /// Notes the windows of a pair's `lanes`, which cross the border of the image, `at` in the run; `gradients` are those of
+    /// a pixel and the side of its window. Returns the lanes whose windows are left to the plain form.
+    #[cold]
+    pub fn note_crossing(
+        &mut self,
+        tile: &Tile,
+        pair: &Pair,
+        lanes: u32,
+        at: usize,
+        gradients: impl Fn((usize, usize), usize) -> Both<f32>,
+    ) -> u32 {
+        let mut plain = 0;
+        for lane in Bits(lanes) {
+            let (pixel, side) = pair.window(lane);
+            if tile.has_only_finite(pixel, side) {
+                self.0[at + lane] = gradients(pixel, side);
+            } else {
+                plain |= 1 << lane;
+            }
+        }
+        plain
     }
 
     /// The normals of the pixels from `at` on, with windows of these sides.
@@ -187,6 +206,12 @@ impl Scale {
             let from_origin = S::sub(coordinates, S::splat(self.origin[c]));
             S::round_i(S::mul(from_origin, S::splat(self.scale)))
         }
+    }
+
+    /// The sum of coordinates `c` themselves, scaled, of `count` points more than are taken away, from that of integers.
+    pub fn sum(&self, c: usize, integers: i32, count: isize) -> f32 {
+        let of_origin = f64::from(self.origin[c]) * f64::from(self.scale);
+        (f64::from(integers) + count as f64 * of_origin) as f32
     }
 
     /// The normals to sums of horizontal and of vertical gradients, over windows of these sides.

@@ -8,10 +8,10 @@
 use super::buffer::Buffer;
 use super::gradients::{Both, Gradients, LeftCorners, PIXEL, Scale, VERTICAL, place, sum_between};
 use super::planes::{Frame, MARGIN, Planes};
-use super::tile::{Bits, Found, Pair, Sums, Tile};
+use super::tile::{Found, Pair, Sums, Tile};
 use crate::Error;
 use crate::memory::{bytes, make_room};
-use crate::methods::{Estimate, average_3d_gradient};
+use crate::methods::{Estimate, average_3d_gradient, start};
 use crate::simd::{Along, GROUP, Groups, Simd};
 use crate::window::Image;
 
@@ -75,30 +75,7 @@ impl StripPairs {
         }
     }
 
-    /// Notes the windows of some lanes of a pair that cross the border of the image; returns the lanes whose windows
-    /// are left to the plain form.
-    #[cold]
-    fn note_crossing(
-        &self,
-        tile: &Tile,
-        frame: &Frame,
-        pair: &Pair,
-        lanes: u32,
-        run: &mut Gradients,
-        at: usize,
-    ) -> u32 {
-        let mut plain = 0;
-        for lane in Bits(lanes) {
-            let (pixel, side) = pair.window(lane);
-            if tile.has_only_finite(pixel, side) {
-                run.put(at + lane, self.of_mirrored(frame, tile.image, pixel, side));
-            } else {
-                plain |= 1 << lane;
-            }
-        }
-        plain
-    }
-
+    /// The gradients of a window that crosses the border of the image.
     fn of_mirrored(
         &self,
         frame: &Frame,
@@ -106,10 +83,9 @@ impl StripPairs {
         (x, y): (usize, usize),
         side: usize,
     ) -> Both<f32> {
-        let half = (side / 2) as isize;
         // Those of each rectangle fit, those of all might not.
         let mut sums = [0_i64; GROUP];
-        for (rect, _) in image.rects((x as isize - half, y as isize - half), (side, side)) {
+        for (rect, _) in image.rects((start(x, side), start(y, side)), (side, side)) {
             let inside = image.inside_frame(&rect);
             if inside.x.is_empty() || inside.y.is_empty() {
                 continue;
@@ -202,7 +178,9 @@ impl Sums for StripPairs {
             unsafe { run.note::<S, _>(&self.ring, &self.places, frame, pair, inside, at) };
         }
         let crossing = pair.windows & !inside;
-        if crossing == 0 { 0 } else { self.note_crossing(tile, frame, pair, crossing, run, at) }
+        let gradients =
+            |pixel: (usize, usize), side: usize| self.of_mirrored(frame, tile.image, pixel, side);
+        if crossing == 0 { 0 } else { run.note_crossing(tile, pair, crossing, at, gradients) }
     }
 
     #[inline(always)]
@@ -219,7 +197,6 @@ impl Sums for StripPairs {
 
     #[cold]
     fn precisely(&self, tile: &Tile, (pixel, side): ((usize, usize), usize)) -> Option<Estimate> {
-        let is_inside = tile.inner(side, pixel.1).contains(&pixel.0);
-        is_inside.then(|| average_3d_gradient::estimate_of_finite(tile.points, pixel, side))
+        Some(average_3d_gradient::estimate_of_finite(tile.points, tile.image, pixel, side))
     }
 }

@@ -12,7 +12,9 @@ use super::planes::{Frame, MARGIN, Planes};
 use super::tile::{Found, Pair, Sums, Tile};
 use crate::Error;
 use crate::memory::{bytes, make_room};
+use crate::methods::start;
 use crate::simd::{Along, GROUP, Groups, Simd};
+use crate::window::Image;
 
 /// The ring of prefix sums.
 #[derive(Debug, Default)]
@@ -58,6 +60,55 @@ impl Strips {
                 S::store_by_lanes(both, ring.add(GROUP * step));
             }
         }
+    }
+}
+
+impl Strips {
+    /// The gradients of a window that crosses the border of the image.
+    fn of_clipped(
+        &self,
+        frame: &Frame,
+        image: &Image,
+        (x, y): (usize, usize),
+        side: usize,
+    ) -> Both<f32> {
+        let [left, top] = [x, y].map(|at| start(at, side));
+        let [right, bottom] = [x, y].map(|at| (at + side / 2) as isize);
+        let above =
+            |x: usize, y: usize| self.ring[frame.start(1, y.wrapping_sub(1)) + frame.column(x)];
+        let down = |x: usize, y: usize| {
+            if y == image.height {
+                // A row is in the ring once the one below it is pushed.
+                return [0, 1, 2].map(|c| self.columns[c * frame.stride + frame.column(x)]);
+            }
+            let [column @ .., _, _, _, _, _] = above(x, y);
+            column
+        };
+        let along = |x: usize, y: usize| {
+            let [_, _, _, _, row @ .., _] = above(x, y);
+            row
+        };
+        let horizontal = [(right, top), (left, top)].map(|strip| {
+            let rect = image.rects(strip, (1, side)).next()?.0;
+            Some(([down(rect.x.start, rect.y.end), down(rect.x.start, rect.y.start)], rect.area()))
+        });
+        let vertical = [(left, bottom), (left, top)].map(|strip| {
+            let rect = image.rects(strip, (side, 1)).next()?.0;
+            Some((
+                [along(rect.x.end, rect.y.start), along(rect.x.start, rect.y.start)],
+                rect.area(),
+            ))
+        });
+        let [[hx, hy, hz], [vx, vy, vz]] = [horizontal, vertical].map(|strips| {
+            // Of strips beyond the border nothing is left.
+            let [ahead, behind] = strips.map(|strip| {
+                let ([end, start], area) = strip.unwrap_or_default();
+                ([0, 1, 2].map(|c| end[c].wrapping_sub(start[c])), area as isize)
+            });
+            let points = ahead.1 - behind.1;
+            [0, 1, 2].map(|c| self.scale.sum(c, ahead.0[c].wrapping_sub(behind.0[c]), points))
+        });
+        [hx, hy, hz, 0.0, vx, vy, vz, 0.0]
     }
 }
 
@@ -147,7 +198,10 @@ impl Sums for Strips {
             // SAFETY: as the caller's.
             unsafe { run.note::<S, _>(&self.ring, &self.places, frame, pair, inside, at) };
         }
-        pair.windows & !inside // the method has no mirrored windows
+        let crossing = pair.windows & !inside;
+        let gradients =
+            |pixel: (usize, usize), side: usize| self.of_clipped(frame, tile.image, pixel, side);
+        if crossing == 0 { 0 } else { run.note_crossing(tile, pair, crossing, at, gradients) }
     }
 
     #[inline(always)]

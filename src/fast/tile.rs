@@ -464,13 +464,15 @@ impl Tile<'_> {
     /// without a depth change only.
     ///
     /// Distances are too large in the image's outermost rows and columns, where only one of the passes works;
-    /// there, the next pixel inwards must have as large a window. The last pixel of all is in no depth change map.
+    /// there, the next pixel inwards must be as far from any depth change. The last pixel of all is in no depth change map.
     pub fn has_only_finite(&self, (x, y): (usize, usize), side: usize) -> bool {
         let Image { width, height, .. } = *self.image;
         let inner = (x.clamp(1, width - 2), y.clamp(1, height - 2));
         let reach = side / 2 + 1;
         let reaches_last = width - 1 <= x + reach && height - 1 <= y + reach;
-        (inner == (x, y) || self.sides.row(inner.1)[inner.0] as usize >= side)
+        // No side is larger than the distance; what is so many rows and columns from the next pixel is 1.4 times as far.
+        let far = side.min((14 * (reach + 1)).div_ceil(10));
+        (inner == (x, y) || self.sides.row(inner.1)[inner.0] as usize >= far)
             && !(reaches_last && self.is_last_apart())
     }
 

@@ -2,6 +2,7 @@
 
 use super::{Estimate, is_finite, normal_of_tangents, start};
 use crate::cloud::Points;
+use crate::rect::Rect;
 use crate::window::Image;
 
 /// The plain form: sums P(x+1, y) - P(x-1, y) and P(x, y+1) - P(x, y-1) over the window.
@@ -24,18 +25,29 @@ pub(crate) fn estimate(
     normal_of_tangents(vertical, horizontal)
 }
 
-/// The same of a window that, with the pixels around it, lies inside the image and holds finite points only: over a row or
-/// column the differences telescope to those between its ends.
-pub(crate) fn estimate_of_finite(points: &Points, (x, y): (usize, usize), side: usize) -> Estimate {
-    let (left, top) = (x - side / 2, y - side / 2);
-    let (right, bottom) = (left + side, top + side);
+/// The same of a window that, with the pixels around it, holds finite points only: over a row or column the differences
+/// telescope to those between its ends.
+pub(crate) fn estimate_of_finite(
+    points: &Points,
+    image: &Image,
+    (x, y): (usize, usize),
+    side: usize,
+) -> Estimate {
     let (mut horizontal, mut vertical) = ([0.0; 3], [0.0; 3]);
-    for ahead in [0, 1] {
-        for y in top..bottom {
-            add(&mut horizontal, points.at(right - ahead, y), points.at(left - ahead, y));
+    for (rect, _) in image.rects((start(x, side), start(y, side)), (side, side)) {
+        let Rect { x: columns, y: rows } = image.inside_frame(&rect);
+        if columns.is_empty() || rows.is_empty() {
+            continue;
         }
-        for x in left..right {
-            add(&mut vertical, points.at(x, bottom - ahead), points.at(x, top - ahead));
+        for ahead in [0, 1] {
+            for y in rows.clone() {
+                let ends = [columns.end, columns.start].map(|x| points.at(x - ahead, y));
+                add(&mut horizontal, ends[0], ends[1]);
+            }
+            for x in columns.clone() {
+                let ends = [rows.end, rows.start].map(|y| points.at(x, y - ahead));
+                add(&mut vertical, ends[0], ends[1]);
+            }
         }
     }
     normal_of_tangents(vertical, horizontal)
