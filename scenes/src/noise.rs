@@ -18,6 +18,9 @@ pub enum Noise {
     /// Disparity noise of 0.5 px, rounded to whole device units, after Khoshelham and Elberink, *Accuracy and
     /// Resolution of Kinect Depth Data for Indoor Mapping Applications*, 2012: 1/z = 3 - 2.85e-3 d.
     Khoshelham,
+    /// As Khoshelham's, but alike in neighbouring pixels, as a sensor's matching windows leave it: means over 7 x 7 pixels, of
+    /// the same standard deviation.
+    Matched,
     /// Normally distributed in z with this standard deviation in metres (the paper's Fig. 8).
     Gaussian(f64),
 }
@@ -25,12 +28,13 @@ pub enum Noise {
 const STEEPEST: f64 = 80.0 / 180.0 * std::f64::consts::PI;
 
 impl Noise {
-    /// The model called `name`: none, nguyen, khoshelham, or gaussian-S with S in metres.
+    /// The model called `name`: none, nguyen, khoshelham, matched, or gaussian-S with S in metres.
     pub fn by_name(name: &str) -> Option<Noise> {
         match name {
             "none" => Some(Noise::None),
             "nguyen" => Some(Noise::Nguyen),
             "khoshelham" => Some(Noise::Khoshelham),
+            "matched" => Some(Noise::Matched),
             _ => name.strip_prefix("gaussian-")?.parse().ok().map(Noise::Gaussian),
         }
     }
@@ -45,8 +49,13 @@ impl Noise {
             normals: Vec::with_capacity(exact.points.len()),
             surfaces: Vec::with_capacity(exact.points.len()),
         };
+        let matched = match self {
+            Noise::Matched => means(camera.width, camera.height, random),
+            _ => Vec::new(),
+        };
         for y in 0..camera.height {
             for x in 0..camera.width {
+                let at = y * camera.width + x;
                 let (x, y) = (x as f64, y as f64);
                 let ray = camera.ray(x, y);
                 let sight = scene.look(ray).and_then(|sight| match self {
@@ -55,7 +64,10 @@ impl Noise {
                         Some(Sight { z: sight.z + sigma * random.normal(), ..sight })
                     }
                     Noise::Khoshelham => {
-                        Some(Sight { z: through_disparity(sight.z, random), ..sight })
+                        Some(Sight { z: through_disparity(sight.z, random.normal()), ..sight })
+                    }
+                    Noise::Matched => {
+                        Some(Sight { z: through_disparity(sight.z, matched[at]), ..sight })
                     }
                     Noise::Nguyen => {
                         let theta = angle(&sight, ray);
@@ -97,11 +109,24 @@ fn axial(theta: f64, z: f64) -> f64 {
     frontal + 0.0001 * theta * theta / (z.sqrt() * left * left)
 }
 
-/// A depth as it comes back from a noisy disparity in whole device units.
-fn through_disparity(z: f64, random: &mut Random) -> f64 {
+/// Normally distributed, row by row, and alike in pixels next to each other.
+fn means(width: usize, height: usize, random: &mut Random) -> Vec<f64> {
+    const SIDE: usize = 7;
+    let columns = width + SIDE - 1;
+    let own: Vec<f64> = (0..columns * (height + SIDE - 1)).map(|_| random.normal()).collect();
+    let mean = |at: usize| {
+        let (x, y) = (at % width, at / width);
+        let rows = own[y * columns..].chunks(columns).take(SIDE);
+        rows.map(|row| row[x..x + SIDE].iter().sum::<f64>()).sum::<f64>() / SIDE as f64
+    };
+    (0..width * height).map(mean).collect()
+}
+
+/// A depth as it comes back from a disparity in whole device units, with this noise in standard deviations.
+fn through_disparity(z: f64, noise: f64) -> f64 {
     const UNIT: f64 = 2.85e-3;
     const SIGMA: f64 = 0.5;
-    let disparity = (3.0 - 1.0 / z) / UNIT + SIGMA * random.normal();
+    let disparity = (3.0 - 1.0 / z) / UNIT + SIGMA * noise;
     1.0 / (3.0 - UNIT * disparity.round())
 }
 

@@ -293,7 +293,7 @@ impl<'a> Candidates<'a> {
         let is_whole = rect.area() as f32 == NEXT && !mean.is_nan();
         let noise = NEAR_NOISE * self.noise;
         if is_whole && is_clean && !self.is_exact {
-            Near { inverse_depth: mean, noise: noise / NEXT }
+            Near { inverse_depth: mean, noise: noise * asked.noise_share() }
         } else {
             Near { inverse_depth: inverse(x, y), noise }
         }

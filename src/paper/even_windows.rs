@@ -6,6 +6,7 @@
 
 use super::bends::BEND_REACH;
 use super::blocks::{BLOCK, Blocks, MIDDLE};
+use super::choices::NEXT;
 use super::cloud::Cloud;
 use super::depth_change::Clean;
 use super::planes::{Plane, estimate_in_space};
@@ -59,6 +60,8 @@ pub(crate) struct Asked<'a> {
     pub limit: u32,
     /// The smallest variance that is told from none.
     pub least_noise: f32,
+    /// How many pixels have the same noise, as [`noise_area`](super::noise::noise_area) tells it.
+    pub noise_area: f32,
     /// Whether estimates have a curvature.
     pub has_curvature: bool,
 }
@@ -82,6 +85,11 @@ impl Asked<'_> {
     fn rect(&self, block: usize, radius: u32, cloud: &Cloud) -> Rect {
         let middle = self.blocks.middle(block);
         Rect::around(middle, radius as usize, (cloud.width, cloud.height))
+    }
+
+    /// The variance of the mean of a pixel and those next to it, as a share of one point's.
+    pub fn noise_share(&self) -> f32 {
+        self.noise_area.min(NEXT) / NEXT
     }
 
     /// The estimate from a window with this plane.
@@ -134,7 +142,7 @@ fn find_even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<(EvenW
     let radii = std::iter::successors(Some(wanted), |radius| Some(radius * 7 / 10));
     let mut radii = radii.take_while(|radius| *radius > clean && *radius >= JAGGED_RADIUS);
     let noise = |plane: &Plane| {
-        let chance = (2.0 / (plane.points as f32 - 3.0)).sqrt();
+        let chance = (2.0 * asked.noise_area / (plane.points as f32 - 3.0)).sqrt();
         plane.unevenness * f64::from(1.0 + CHANCE * chance)
     };
     let least_noise = f64::from(asked.least_noise);
@@ -148,7 +156,8 @@ fn find_even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<(EvenW
         {
             if found.unevenness < noise(&half).max(least_noise) {
                 let sides2 = [radius, radius / 2].map(|radius| (2 * radius + 1).pow(2));
-                let bend2 = found.bend2(&half, f64::from(sides2[0] - sides2[1]), least_noise);
+                let sides2 = f64::from(sides2[0] - sides2[1]);
+                let bend2 = found.bend2(&half, sides2, least_noise, asked.noise_area.into());
                 return Some((radius, found, bend2));
             }
             (radius, found) = (radius / 2, half);
@@ -165,7 +174,7 @@ fn find_even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<(EvenW
         steepness: plane.steepness_squared.sqrt() as f32,
         unevenness: plane.unevenness as f32,
         noise: noise(&plane) as f32,
-        per_noise: 12.0 / points / (side * side),
+        per_noise: 12.0 * asked.noise_area / points / (side * side),
         bend2: bend2 as f32,
     };
     Some((window, asked.estimate(&plane, is_jagged)))

@@ -14,6 +14,7 @@ mod distance;
 mod even_windows;
 mod marks;
 mod methods;
+mod noise;
 mod planes;
 mod second_pass;
 pub(crate) mod smoothing_area;

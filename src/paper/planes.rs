@@ -95,10 +95,11 @@ impl Plane {
 
     /// How much the slope of the surface changes from pixel to pixel, squared, as far as it is not chance: told from how far
     /// the mean of the window's middle is off this plane. The square of the window's side is by `sides2` more than that of
-    /// its middle.
-    pub fn bend2(&self, middle: &Plane, sides2: f64, least_noise: f64) -> f64 {
+    /// its middle; `area` pixels have the same noise.
+    pub fn bend2(&self, middle: &Plane, sides2: f64, least_noise: f64, area: f64) -> f64 {
         let off = dot(self.q, middle.ray) - middle.inverse_depth;
-        let noise = self.unevenness.max(least_noise) * (1.0 / middle.points - 1.0 / self.points);
+        let share = area * (1.0 / middle.points - 1.0 / self.points);
+        let noise = self.unevenness.max(least_noise) * share;
         let off2 = (off * off - Self::BEND_NOISE * noise.max(0.0)).max(0.0);
         // The mean of a parabola over a side is above its top by a 24th of the bend times the side's square.
         let bend = 24.0 / sides2;
@@ -149,7 +150,7 @@ mod tests {
             let plane = |radius: usize| {
                 Plane::of(&cloud, &Rect::around(middle, radius, (width, height))).unwrap()
             };
-            let found = plane(10).bend2(&plane(5), 441.0 - 121.0, 1e-12).sqrt();
+            let found = plane(10).bend2(&plane(5), 441.0 - 121.0, 1e-12, 1.0).sqrt();
             assert!((found - told).abs() <= 0.1 * told, "bend {bend}, noise {noise}: {found}");
         }
     }

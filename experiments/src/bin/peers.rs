@@ -18,7 +18,8 @@ use iine_experiments::{exchange, parallel, ranking, table};
 use iine_scenes::{Camera, Distances, Frame, Noise, Random, SCENES, scene};
 
 /// The noise models, and the seeds of each.
-const NOISES: [(&str, &[u64]); 3] = [("none", &[1]), ("nguyen", &[1]), ("khoshelham", &[1])];
+const NOISES: [(&str, &[u64]); 4] =
+    [("none", &[1]), ("nguyen", &[1]), ("khoshelham", &[1]), ("matched", &[1])];
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

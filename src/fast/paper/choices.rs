@@ -876,7 +876,7 @@ impl Rows {
             let there = S::mask((1 << blocks) - 1);
             let none = S::splat(f32::NAN);
             let noise = Floats::splat(NEAR_NOISE) * noise;
-            let of_mean = noise / Floats::splat(NEXT);
+            let of_mean = noise * Floats::splat(even.asked.noise_share());
             let to = pixels.as_mut_ptr().cast::<Pixels<S>>();
             for line in 0..BLOCK {
                 let depths = self.four::<S>(&self.depths, line, columns);

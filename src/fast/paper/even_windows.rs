@@ -119,15 +119,15 @@ impl<S: Groups> Fits<S> {
         self.turned = self.turned & !lanes | others.turned & lanes;
     }
 
-    /// The variance that the unevenness may be of.
+    /// The variance that the unevenness may be of, where `area` pixels have the same noise.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn noise(&self) -> Doubles<S> {
+    unsafe fn noise(&self, area: f32) -> Doubles<S> {
         // SAFETY: as the caller's.
         unsafe {
-            let chance = Floats::splat(2.0) / (self.points.narrow() - Floats::splat(3.0));
+            let chance = Floats::splat(2.0 * area) / (self.points.narrow() - Floats::splat(3.0));
             let chance = Floats::splat(1.0) + Floats::splat(CHANCE) * chance.sqrt();
             self.unevenness * chance.widen()
         }
@@ -138,13 +138,19 @@ impl<S: Groups> Fits<S> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn bend2(&self, middle: &Self, sides2: Floats<S>, least_noise: Doubles<S>) -> Floats<S> {
+    unsafe fn bend2(
+        &self,
+        middle: &Self,
+        sides2: Floats<S>,
+        least_noise: Doubles<S>,
+        area: f32,
+    ) -> Floats<S> {
         // SAFETY: as the caller's.
         unsafe {
             let off = dot(self.q, middle.ray) - middle.inverse_depth;
             let one = Doubles::splat(1.0);
-            let noise =
-                self.unevenness.max(least_noise) * (one / middle.points - one / self.points);
+            let share = Doubles::splat(area.into()) * (one / middle.points - one / self.points);
+            let noise = self.unevenness.max(least_noise) * share;
             let (zero, most) = (Doubles::splat(0.0), Doubles::splat(Plane::BEND_NOISE));
             let off2 = (off * off - most * noise.max(zero)).max(zero);
             let bend = Doubles::splat(24.0) / sides2.widen();
@@ -161,8 +167,8 @@ impl<S: Groups> Fits<S> {
         &self,
         radii: Floats<S>,
         bend2: Floats<S>,
-        there: u32,
-        asked: u32,
+        (there, asked): (u32, u32),
+        area: f32,
         windows: &mut [EvenWindow],
     ) {
         const { assert!(size_of::<EvenWindow>() == size_of::<[f32; 12]>()) };
@@ -173,12 +179,12 @@ impl<S: Groups> Fits<S> {
             // As `even_window` has it.
             let (one, points) = (Floats::splat(1.0), self.points.narrow());
             let side = Floats::splat(2.0) * radii + one;
-            let per_noise = Floats::splat(12.0) / points / (side * side);
+            let per_noise = Floats::splat(12.0 * area) / points / (side * side);
             let steepness = self.steepness_squared.narrow().sqrt();
             let fours = [
                 [radii, a.narrow(), b.narrow(), c.narrow()],
                 [x.narrow(), y.narrow(), z.narrow(), steepness],
-                [self.unevenness.narrow(), self.noise().narrow(), per_noise, bend2],
+                [self.unevenness.narrow(), self.noise(area).narrow(), per_noise, bend2],
             ];
             let to = found.as_mut_ptr().cast::<f32>();
             for (fields, place) in fours.into_iter().zip((0..).step_by(4)) {
@@ -343,6 +349,7 @@ impl EvenTile<'_> {
             let largest = Floats(S::and(S::mask(asked), largest));
             let (zero, one) = (Floats::<S>::splat(0.0), Floats::<S>::splat(1.0));
             let least = Doubles::splat(f64::from(of_image.least_noise));
+            let area = of_image.noise_area;
             let smallest = Floats::splat(JAGGED_RADIUS as f32 - 1.0);
             // On steep surfaces, windows with depth changes; then, or else, windows without, and smaller ones while those
             // are much more even.
@@ -366,13 +373,13 @@ impl EvenTile<'_> {
                     hidden |= fits.hidden & todo;
                 }
                 let is_jagged = jagged & fits.there & self.jagged(&fits, &pixels, radii, y);
-                let is_enough = best.unevenness.lt(fits.noise().max(least));
+                let is_enough = best.unevenness.lt(fits.noise(area).max(least));
                 let is_better = even & fits.there & !is_enough;
                 let bends = even & fits.there & is_enough;
                 if bends != 0 {
                     let sides = [found, radii].map(|radii| radii + radii + one);
                     let sides2 = sides[0] * sides[0] - sides[1] * sides[1];
-                    bend2.take(S::mask(bends), best.bend2(&fits, sides2, least));
+                    bend2.take(S::mask(bends), best.bend2(&fits, sides2, least, area));
                 }
                 found.take(S::mask(is_jagged | is_better), radii);
                 best.take(is_jagged | is_better, &fits);
@@ -393,7 +400,7 @@ impl EvenTile<'_> {
                 windows[lane].radius = WAITS;
             }
             let (there, asked) = (zero.lt(found), asked & !hidden);
-            best.write_windows(found, bend2, there, asked, windows);
+            best.write_windows(found, bend2, (there, asked), area, windows);
             best.write_estimates(jagged_found & asked, of_image.has_curvature, asked, estimates);
             // What rounding could decide is left to the plain form.
             for lane in Bits(asked & doubtful) {
