@@ -185,6 +185,16 @@ fn windows_near_depth_changes_and_creases_equal_the_plain_form() {
     options.one_sided_windows = true;
     options.crease_windows = true;
     worst.check(&cloud, "several tiles", &options);
+    let mut cloud = Cloud::new(Kind::NanBlocks, 240, 180, 4);
+    let mut random = Random::new(4);
+    let noise: Vec<_> = (0..80 * 60).map(|_| random.between(-0.003, 0.003)).collect();
+    for (at, point) in cloud.points.iter_mut().enumerate() {
+        let cell = at / 240 / 3 * 80 + at % 240 / 3;
+        *point = point.map(|coordinate| coordinate * (1.0 + noise[cell]));
+    }
+    for options in edge_options() {
+        worst.check(&cloud, "noise that pixels share", &options);
+    }
     println!("{worst:?}");
 }
 
