@@ -10,11 +10,12 @@ use crate::rect::Rect;
 const SAMPLES: usize = 10;
 const FEWEST: usize = 16;
 
-/// Their radii: small enough for noise that few neighbours share, twice as large or more, and again.
-const RADII: [usize; 3] = [2, 5, 10];
+/// Their radii: small enough for noise that few neighbours share, and twice as large or more.
+const SMALL: [usize; 2] = [2, 5];
+const LARGE: [usize; 2] = [5, 10];
 
-/// Of the variance in the middle window, noise of its own in every pixel leaves more than this share in the small one, in half
-/// of all windows; and a surface that is round and without noise, less than that.
+/// Of the variance in the larger one of two windows, noise of its own in every pixel leaves more than this share in the smaller
+/// one, in half of all places; and a surface that is round and without noise, less than that.
 const OWN: f64 = 0.75;
 const ROUND: f64 = 0.08;
 
@@ -25,45 +26,54 @@ const ROUND: f64 = 0.08;
 /// grows leaves exp(-3 `area` / n). Small windows tell best whether there is such an area, as surfaces are plane there, and
 /// larger ones how large it is.
 pub(crate) fn noise_area(cloud: &Cloud, blocks: &Blocks, clean: &Clean, least_noise: f32) -> f32 {
-    let line = |number: usize, count: usize| (2 * number + 1) * count / (2 * SAMPLES);
-    let [_, _, largest] = RADII;
-    let (mut told, mut count) = ([[0.0; 2]; SAMPLES * SAMPLES], 0);
-    for sample in 0..told.len() {
-        let column = line(sample % SAMPLES, blocks.across);
-        let row = line(sample / SAMPLES, blocks.down);
-        if clean.radii[row * blocks.across + column] as usize >= largest
-            && let Some(shares) = shares(cloud, blocks.middle_of((column, row)), least_noise)
-        {
-            told[count] = shares;
-            count += 1;
-        }
-    }
-    let told = &mut told[..count];
-    let mut median = |which: usize| {
-        told.sort_unstable_by(|a, b| a[which].total_cmp(&b[which]));
-        told[count / 2][which]
-    };
-    if count < FEWEST || median(0) > OWN {
-        return 1.0;
-    }
-    let [_, middle, large] = RADII.map(|radius| ((2 * radius + 1) * (2 * radius + 1)) as f64);
-    let area = -median(1).ln() / (3.0 / middle - 3.0 / large);
+    let median = |radii: [usize; 2]| median(cloud, blocks, clean, radii, least_noise.into());
+    let is_shared = median(SMALL).is_some_and(|share| share <= OWN);
+    let Some(share) = is_shared.then(|| median(LARGE)).flatten() else { return 1.0 };
+    let [middle, large] = LARGE.map(|radius| points(radius) as f64);
+    let area = -share.ln() / (3.0 / middle - 3.0 / large);
     // Where it is larger than windows are, they do not tell by how much.
     area.max(1.0).min(large) as f32
 }
 
-/// Of the variance in the window of the middle radius around a pixel, the share in the small one; and of that in the large one,
-/// the share in the middle one. None if windows are not whole, or without noise.
-fn shares(cloud: &Cloud, pixel: (usize, usize), least_noise: f32) -> Option<[f64; 2]> {
-    let variance = |radius: usize| {
-        let rect = Rect::around(pixel, radius, (cloud.width, cloud.height));
-        let is_whole = |plane: &Plane| plane.points == ((2 * radius + 1).pow(2)) as f64;
-        Plane::of(cloud, &rect).filter(is_whole).map(|plane| plane.unevenness)
-    };
-    let [small, middle, large] = RADII.map(variance);
-    let (small, middle, large) = (small?, middle?, large?);
-    let has_noise = f64::from(least_noise) < middle && ROUND * middle < small;
-    has_noise.then_some([small / middle, middle / large])
+/// The share of the variance in windows of the larger radius that is left in those of the smaller one around the same pixels,
+/// in the median; none where few tell.
+fn median(
+    cloud: &Cloud,
+    blocks: &Blocks,
+    clean: &Clean,
+    radii: [usize; 2],
+    least_noise: f64,
+) -> Option<f64> {
+    let line = |number: usize, count: usize| (2 * number + 1) * count / (2 * SAMPLES);
+    let (mut shares, mut count) = ([0.0; SAMPLES * SAMPLES], 0);
+    for sample in 0..shares.len() {
+        let column = line(sample % SAMPLES, blocks.across);
+        let row = line(sample / SAMPLES, blocks.down);
+        if clean.radii[row * blocks.across + column] as usize >= LARGE[1]
+            && let Some(share) = share(cloud, blocks.middle_of((column, row)), radii, least_noise)
+        {
+            shares[count] = share;
+            count += 1;
+        }
+    }
+    let shares = &mut shares[..count];
+    shares.sort_unstable_by(f64::total_cmp);
+    (count >= FEWEST).then(|| shares[count / 2])
+}
+
+/// That around one pixel; none if a point is missing, or if there is no noise.
+fn share(cloud: &Cloud, pixel: (usize, usize), radii: [usize; 2], least_noise: f64) -> Option<f64> {
+    let size = (cloud.width, cloud.height);
+    let [small, large] = radii.map(|radius| Plane::of(cloud, &Rect::around(pixel, radius, size)));
+    let (small, large) = (small?, large?);
+    let is_whole = large.points == points(radii[1]) as f64;
+    let share = small.unevenness / large.unevenness;
+    (is_whole && least_noise < large.unevenness && ROUND < share).then_some(share)
+}
+
+/// How many points a window of this radius has.
+fn points(radius: usize) -> usize {
+    (2 * radius + 1).pow(2)
 }
 
 #[cfg(test)]
