@@ -61,9 +61,7 @@ impl Strips {
             }
         }
     }
-}
 
-impl Strips {
     /// The gradients of a window that crosses the border of the image.
     fn of_clipped(
         &self,

@@ -12,7 +12,8 @@ const FEWEST: usize = 16;
 
 /// Their radii: small enough for noise that few neighbours share, and twice as large or more.
 const SMALL: [usize; 2] = [2, 5];
-const LARGE: [usize; 2] = [5, 10];
+const LARGE: [usize; 2] = [5, FARTHEST];
+pub(crate) const FARTHEST: usize = 10;
 
 /// Of the variance in the larger one of two windows, noise of its own in every pixel leaves more than this share in the smaller
 /// one, in half of all places; and a surface that is round and without noise, less than that.
@@ -49,7 +50,7 @@ fn median(
     for sample in 0..shares.len() {
         let column = line(sample % SAMPLES, blocks.across);
         let row = line(sample / SAMPLES, blocks.down);
-        if clean.radii[row * blocks.across + column] as usize >= LARGE[1]
+        if clean.radii[row * blocks.across + column] as usize >= FARTHEST
             && let Some(share) = share(cloud, blocks.middle_of((column, row)), radii, least_noise)
         {
             shares[count] = share;

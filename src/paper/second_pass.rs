@@ -10,7 +10,7 @@ use super::cloud::Cloud;
 use super::depth_change::DepthChanges;
 use super::even_windows::{Asked, EvenWindow};
 use super::marks::{Marks, WORD, word_of};
-use super::noise::noise_area;
+use super::noise::{FARTHEST, noise_area};
 use super::{is_depth_change, of_radius, smoothing_area, surroundings};
 use crate::Error;
 use crate::cloud::Points;
@@ -119,8 +119,8 @@ impl SecondPass {
         }
         let size = (cloud.width, cloud.height);
         let limit = options.paper.largest_radius;
-        // Windows of whole blocks reach somewhat farther than small ones.
-        let farthest = limit.max((BEND_REACH * BLOCK + MIDDLE) as u32);
+        // Windows of whole blocks, and those that tell the noise, reach somewhat farther than small ones.
+        let farthest = limit.max((BEND_REACH * BLOCK + MIDDLE).max(FARTHEST) as u32);
         let clean = depth_changes.clean(size, farthest, engine.workers())?;
         let blocks = Blocks::of(cloud.width, cloud.height);
         find_wanted(wanted, cloud, &blocks, options, engine.workers())?;
