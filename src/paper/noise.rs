@@ -3,7 +3,7 @@
 use super::blocks::Blocks;
 use super::cloud::Cloud;
 use super::depth_change::Clean;
-use super::planes::Plane;
+use super::planes::{Plane, inverse_depth};
 use crate::rect::Rect;
 
 /// Windows are looked at in so many columns and rows of the image; so many at least must tell.
@@ -20,49 +20,61 @@ pub(crate) const FARTHEST: usize = 10;
 const OWN: f64 = 0.75;
 const ROUND: f64 = 0.08;
 
+/// And in the differences between neighbours more than this share of those between pixels `LAG` apart, however the surface
+/// bends.
+const OWN_DIFFERENCES: f64 = 0.8;
+const LAG: usize = 3;
+
 /// How many pixels have the same noise: n points tell of a plane as much as that many times fewer with noise of their own.
 /// 1 if each pixel has its own.
 ///
 /// A plane follows what is alike in `area` pixels: of the variance in n points it takes the share 3 `area` / n, or as that
-/// grows leaves exp(-3 `area` / n). Small windows tell best whether there is such an area, as surfaces are plane there, and
-/// larger ones how large it is.
+/// grows leaves exp(-3 `area` / n). Small windows and differences tell best whether there is such an area, as surfaces are
+/// plane there, and larger windows how large it is.
 pub(crate) fn noise_area(cloud: &Cloud, blocks: &Blocks, clean: &Clean, least_noise: f32) -> f32 {
-    let median = |radii: [usize; 2]| median(cloud, blocks, clean, radii, least_noise.into());
-    let is_shared = median(SMALL).is_some_and(|share| share <= OWN);
-    let Some(share) = is_shared.then(|| median(LARGE)).flatten() else { return 1.0 };
+    let of_windows = |radii: [usize; 2]| {
+        median(blocks, clean, |pixel| share(cloud, pixel, radii, least_noise.into()))
+    };
+    let of_differences = || {
+        median(blocks, clean, |pixel| {
+            let [near, far] = [1, LAG].map(|lag| differences(cloud, pixel, lag));
+            Some(near / far).filter(|share| !share.is_nan())
+        })
+    };
+    let is_shared = of_windows(SMALL).is_some_and(|share| share <= OWN)
+        && of_differences().is_some_and(|share| share <= OWN_DIFFERENCES);
+    let Some(share) = is_shared.then(|| of_windows(LARGE)).flatten() else { return 1.0 };
     let [middle, large] = LARGE.map(|radius| points(radius) as f64);
     let area = -share.ln() / (3.0 / middle - 3.0 / large);
     // Where it is larger than windows are, they do not tell by how much.
     area.max(1.0).min(large) as f32
 }
 
-/// The share of the variance in windows of the larger radius that is left in those of the smaller one around the same pixels,
-/// in the median; none where few tell.
+/// The median of what the places around which no depth change is near tell; none if few do.
 fn median(
-    cloud: &Cloud,
     blocks: &Blocks,
     clean: &Clean,
-    radii: [usize; 2],
-    least_noise: f64,
+    tell: impl Fn((usize, usize)) -> Option<f64>,
 ) -> Option<f64> {
     let line = |number: usize, count: usize| (2 * number + 1) * count / (2 * SAMPLES);
-    let (mut shares, mut count) = ([0.0; SAMPLES * SAMPLES], 0);
-    for sample in 0..shares.len() {
+    let (mut told, mut count) = ([0.0; SAMPLES * SAMPLES], 0);
+    for sample in 0..told.len() {
         let column = line(sample % SAMPLES, blocks.across);
         let row = line(sample / SAMPLES, blocks.down);
         if clean.radii[row * blocks.across + column] as usize >= FARTHEST
-            && let Some(share) = share(cloud, blocks.middle_of((column, row)), radii, least_noise)
+            && let Some(value) = tell(blocks.middle_of((column, row)))
         {
-            shares[count] = share;
+            told[count] = value;
             count += 1;
         }
     }
-    let shares = &mut shares[..count];
-    shares.sort_unstable_by(f64::total_cmp);
-    (count >= FEWEST).then(|| shares[count / 2])
+    let told = &mut told[..count];
+    told.sort_unstable_by(f64::total_cmp);
+    (count >= FEWEST).then(|| told[count / 2])
 }
 
-/// That around one pixel; none if a point is missing, or if there is no noise.
+/// The share of the variance in the window of the larger radius around a pixel that is left in that of the smaller one; none if
+/// a point is missing, or if there is no noise.
 fn share(cloud: &Cloud, pixel: (usize, usize), radii: [usize; 2], least_noise: f64) -> Option<f64> {
     let size = (cloud.width, cloud.height);
     let [small, large] = radii.map(|radius| Plane::of(cloud, &Rect::around(pixel, radius, size)));
@@ -75,6 +87,29 @@ fn share(cloud: &Cloud, pixel: (usize, usize), radii: [usize; 2], least_noise: f
 /// How many points a window of this radius has.
 fn points(radius: usize) -> usize {
     (2 * radius + 1).pow(2)
+}
+
+/// The mean square of how far inverse depths are from the mean of those `lag` columns or rows before and behind, around a
+/// pixel; not a number if a point is missing.
+fn differences(cloud: &Cloud, pixel: (usize, usize), lag: usize) -> f64 {
+    let Rect { x: columns, y: rows } = Rect::around(pixel, SMALL[1], (cloud.width, cloud.height));
+    let inverse = |x: usize, y: usize| f64::from(inverse_depth(cloud.depths[cloud.index(x, y)]));
+    let (mut sum, mut count) = (0.0, 0.0);
+    let mut add = |before: f64, own: f64, behind: f64| {
+        sum += (own - (before + behind) / 2.0).powi(2);
+        count += 1.0;
+    };
+    for y in rows.clone() {
+        for x in columns.start + lag..columns.end.saturating_sub(lag) {
+            add(inverse(x - lag, y), inverse(x, y), inverse(x + lag, y));
+        }
+    }
+    for y in rows.start + lag..rows.end.saturating_sub(lag) {
+        for x in columns.clone() {
+            add(inverse(x, y - lag), inverse(x, y), inverse(x, y + lag));
+        }
+    }
+    sum / count
 }
 
 #[cfg(test)]
