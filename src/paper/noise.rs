@@ -95,18 +95,13 @@ fn differences(cloud: &Cloud, pixel: (usize, usize), lag: usize) -> f64 {
     let Rect { x: columns, y: rows } = Rect::around(pixel, SMALL[1], (cloud.width, cloud.height));
     let inverse = |x: usize, y: usize| f64::from(inverse_depth(cloud.depths[cloud.index(x, y)]));
     let (mut sum, mut count) = (0.0, 0.0);
-    let mut add = |before: f64, own: f64, behind: f64| {
-        sum += (own - (before + behind) / 2.0).powi(2);
-        count += 1.0;
-    };
-    for y in rows.clone() {
-        for x in columns.start + lag..columns.end.saturating_sub(lag) {
-            add(inverse(x - lag, y), inverse(x, y), inverse(x + lag, y));
-        }
-    }
-    for y in rows.start + lag..rows.end.saturating_sub(lag) {
-        for x in columns.clone() {
-            add(inverse(x, y - lag), inverse(x, y), inverse(x, y + lag));
+    for (dx, dy) in [(lag, 0), (0, lag)] {
+        for y in rows.start + dy..rows.end.saturating_sub(dy) {
+            for x in columns.start + dx..columns.end.saturating_sub(dx) {
+                let beside = (inverse(x - dx, y - dy) + inverse(x + dx, y + dy)) / 2.0;
+                sum += (inverse(x, y) - beside).powi(2);
+                count += 1.0;
+            }
         }
     }
     sum / count
