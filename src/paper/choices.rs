@@ -2,7 +2,8 @@
 //! slope of a plane through its points. Noise of variance v in n points leaves 12 v / (n L^2) in a window of side L;
 //! points that do not lie in the window's plane, or a pixel that does not, bend it by some share of their deviation over
 //! L; and where the surface itself bends, the slope changes by that from pixel to pixel. And beside a crease, the one on
-//! the pixel's side.
+//! the pixel's side. But where windows are as large as they may be, what makes them differ is chance: there each pixel
+//! takes its own block's.
 //!
 //! Blocks are seldom on more than two surfaces, so two of a block's pixels choose for all: the middle one, and the one
 //! to which the window of the middle one is worth least.
@@ -67,7 +68,7 @@ pub(crate) struct EvenWindows<'a> {
     pub cloud: &'a Cloud,
     pub asked: &'a Asked<'a>,
     pub options: &'a Options,
-    /// The pixels that may take one.
+    /// The pixels that may take one: they have points.
     pub concerned: &'a Marks,
     /// From how many radii at most the windows come that a block's pixels can take, starting with the largest and halving
     /// it, block by block; 0 for a block that takes none.
@@ -80,6 +81,27 @@ impl EvenWindows<'_> {
     /// The radius of a block's window; 0 for none.
     pub fn radius(&self, block: usize) -> u32 {
         self.windows[block].radius as u32
+    }
+
+    /// Whether a block's window is whole, as large as it may be, as those next to it are, and reaches beyond the block: no edge
+    /// is near.
+    pub fn is_far_from_edges(&self, (column, row): (usize, usize)) -> bool {
+        let EvenWindows { cloud, asked, windows, .. } = self;
+        let Blocks { across, down, .. } = asked.blocks;
+        let is_full = |column: usize, row: usize| {
+            let block = row * across + column;
+            let radius = windows[block].radius as u32;
+            radius > 0 && radius >= asked.largest(block)
+        };
+        let (x, y) = asked.blocks.middle_of((column, row));
+        let radius = self.radius(row * across + column) as usize;
+        let is_inside = |at: usize, count: usize| radius <= at && at + radius < count;
+        radius >= BLOCK
+            && is_full(column, row)
+            && is_inside(x, cloud.width)
+            && is_inside(y, cloud.height)
+            && lines_around(column, 1, across).iter().all(|column| is_full(*column, row))
+            && lines_around(row, 1, down).iter().all(|row| is_full(column, *row))
     }
 
     /// Calls `visit` with the blocks whose windows a block's pixels can take: itself, and those one radius away along
@@ -107,8 +129,25 @@ impl EvenWindows<'_> {
         choices.fill(NO_WINDOW);
         let levels = self.levels.iter().enumerate();
         for (block, _) in levels.filter(|(_, level)| **level > 0) {
-            Candidates::of(self, block).choose(choices);
+            let place = self.asked.blocks.place(block);
+            let pixels = self.pixels_that_take(place);
+            if self.is_far_from_edges(place) {
+                pixels.for_each(|(x, y)| choices[self.cloud.index(x, y)] = block as u32);
+            } else {
+                Candidates::of(self, block).choose(pixels, choices);
+            }
         }
+    }
+
+    /// A block's pixels that may take a window.
+    fn pixels_that_take(
+        &self,
+        (column, row): (usize, usize),
+    ) -> impl Iterator<Item = (usize, usize)> {
+        let EvenWindows { cloud, concerned, .. } = self;
+        let lines = |line: usize, end: usize| line * BLOCK..((line + 1) * BLOCK).min(end);
+        let inside = Rect { x: lines(column, cloud.width), y: lines(row, cloud.height) };
+        inside.pixels().filter(|pixel| concerned.has(*pixel))
     }
 
     /// How far from a plane a pixel's point may lie to be on that surface, in inverse depth: half a depth change.
@@ -161,17 +200,9 @@ impl<'a> Candidates<'a> {
         [x as f32 - self.middle[0] as f32, y as f32 - self.middle[1] as f32]
     }
 
-    /// Writes what the block's pixels take.
-    fn choose(&self, choices: &mut [u32]) {
-        let EvenWindows { cloud, concerned, .. } = self.even;
-        let [x, y] = self.middle.map(|middle| middle - MIDDLE);
-        let ends = [(x, cloud.width), (y, cloud.height)].map(|(at, end)| (at + BLOCK).min(end));
-        let inside = Rect { x: x..ends[0], y: y..ends[1] };
-        let takes_some = |&(x, y): &(usize, usize)| {
-            concerned.has((x, y)) && !cloud.is_missing(cloud.index(x, y))
-        };
-        let pixels: Vec<Pixel> =
-            inside.pixels().filter(takes_some).map(|pixel| self.pixel(pixel)).collect();
+    /// Writes what these pixels of the block take.
+    fn choose(&self, pixels: impl Iterator<Item = (usize, usize)>, choices: &mut [u32]) {
+        let pixels: Vec<Pixel> = pixels.map(|pixel| self.pixel(pixel)).collect();
         let is_middle = |pixel: &&Pixel| pixel.way == [0.0; 2];
         let Some(first) = pixels.iter().find(is_middle).or(pixels.first()) else { return };
         let best_of_first = self.best(first);

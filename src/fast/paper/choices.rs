@@ -42,7 +42,13 @@ pub(super) unsafe fn rows<S: Groups>(
         choices.fill(NO_WINDOW);
         let levels = &even.levels[row * across..][..across];
         concerned.clear();
-        concerned.extend((0..across).filter(|block| levels[*block] > 0));
+        for column in (0..across).filter(|column| levels[*column] > 0) {
+            if even.is_far_from_edges((column, row)) {
+                take_own(even, (column, row), choices);
+            } else {
+                concerned.push(column);
+            }
+        }
         if concerned.is_empty() {
             continue;
         }
@@ -61,10 +67,23 @@ pub(super) unsafe fn rows<S: Groups>(
     }
 }
 
+/// Writes the choices of the block in a column and row, which is whole, for those of its row: its own window for all pixels that
+/// may take one.
+fn take_own(even: &EvenWindows, (column, row): (usize, usize), choices: &mut [u32]) {
+    let own = (row * even.asked.blocks.across + column) as u32;
+    let x = column * BLOCK;
+    for (y, choices) in (row * BLOCK..).zip(choices.chunks_mut(even.cloud.width)) {
+        let marks = marks_from(even.concerned.row(y), x);
+        for (at, to) in choices[x..x + BLOCK].iter_mut().enumerate() {
+            *to = if marks >> at & 1 != 0 { own } else { NO_WINDOW };
+        }
+    }
+}
+
 /// What one worker needs, kept from frame to frame.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
-    /// The columns of a row's blocks whose pixels can take windows.
+    /// The columns of a row's blocks whose pixels choose.
     concerned: Vec<usize>,
     rows: Rows,
     candidates: Vec<Candidates>,
