@@ -86,18 +86,17 @@ impl EvenWindows<'_> {
     /// Whether a block's window is whole, as large as it may be, as those next to it are, and reaches beyond the block: no edge
     /// is near.
     pub fn is_far_from_edges(&self, (column, row): (usize, usize)) -> bool {
-        let EvenWindows { cloud, asked, windows, .. } = self;
+        let EvenWindows { cloud, asked, .. } = self;
         let Blocks { across, down, .. } = asked.blocks;
         let is_full = |column: usize, row: usize| {
             let block = row * across + column;
-            let radius = windows[block].radius as u32;
+            let radius = self.radius(block);
             radius > 0 && radius >= asked.largest(block)
         };
         let (x, y) = asked.blocks.middle_of((column, row));
         let radius = self.radius(row * across + column) as usize;
         let is_inside = |at: usize, count: usize| radius <= at && at + radius < count;
         radius >= BLOCK
-            && is_full(column, row)
             && is_inside(x, cloud.width)
             && is_inside(y, cloud.height)
             && lines_around(column, 1, across).iter().all(|column| is_full(*column, row))
