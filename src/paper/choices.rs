@@ -85,22 +85,21 @@ impl EvenWindows<'_> {
 
     /// Whether a block's window is whole, as large as it may be, as those next to it are, and reaches beyond the block: no edge
     /// is near.
-    pub fn is_far_from_edges(&self, (column, row): (usize, usize)) -> bool {
+    pub fn is_far_from_edges(&self, block: usize) -> bool {
         let EvenWindows { cloud, asked, .. } = self;
-        let Blocks { across, down, .. } = asked.blocks;
-        let is_full = |column: usize, row: usize| {
-            let block = row * across + column;
+        let blocks = &asked.blocks;
+        let is_full = |block: usize| {
             let radius = self.radius(block);
             radius > 0 && radius >= asked.largest(block)
         };
-        let (x, y) = asked.blocks.middle_of((column, row));
-        let radius = self.radius(row * across + column) as usize;
-        let is_inside = |at: usize, count: usize| radius <= at && at + radius < count;
-        radius >= BLOCK
-            && is_inside(x, cloud.width)
-            && is_inside(y, cloud.height)
-            && lines_around(column, 1, across).iter().all(|column| is_full(*column, row))
-            && lines_around(row, 1, down).iter().all(|row| is_full(column, *row))
+        let radius = self.radius(block) as usize;
+        let is_inside = || {
+            let (x, y) = blocks.middle(block);
+            radius <= x && x + radius < cloud.width && radius <= y && y + radius < cloud.height
+        };
+        // Then there are blocks on all sides.
+        let next_to_it = || [block - 1, block + 1, block - blocks.across, block + blocks.across];
+        radius >= BLOCK && is_full(block) && is_inside() && next_to_it().into_iter().all(is_full)
     }
 
     /// Calls `visit` with the blocks whose windows a block's pixels can take: itself, and those one radius away along
@@ -130,7 +129,7 @@ impl EvenWindows<'_> {
         for (block, _) in levels.filter(|(_, level)| **level > 0) {
             let place = self.asked.blocks.place(block);
             let pixels = self.pixels_that_take(place);
-            if self.is_far_from_edges(place) {
+            if self.is_far_from_edges(block) {
                 pixels.for_each(|(x, y)| choices[self.cloud.index(x, y)] = block as u32);
             } else {
                 Candidates::of(self, block).choose(pixels, choices);
