@@ -83,23 +83,37 @@ impl EvenWindows<'_> {
         self.windows[block].radius as u32
     }
 
-    /// Whether a block's window is whole, as large as it may be, as those next to it are, and reaches beyond the block: no edge
-    /// is near.
+    /// Whether a block's window is whole, as large as it may be, as those next to it are, and reaches beyond the block, and those
+    /// one radius away that are as large are no more even: no edge is near.
     pub fn is_far_from_edges(&self, block: usize) -> bool {
-        let EvenWindows { cloud, asked, .. } = self;
+        let EvenWindows { cloud, asked, windows, .. } = self;
         let blocks = &asked.blocks;
         let is_full = |block: usize| {
             let radius = self.radius(block);
             radius > 0 && radius >= asked.largest(block)
         };
-        let radius = self.radius(block) as usize;
+        let own = &windows[block];
+        let radius = own.radius as usize;
         let is_inside = || {
             let (x, y) = blocks.middle(block);
             radius <= x && x + radius < cloud.width && radius <= y && y + radius < cloud.height
         };
-        // Then there are blocks on all sides.
-        let next_to_it = || [block - 1, block + 1, block - blocks.across, block + blocks.across];
-        radius >= BLOCK && is_full(block) && is_inside() && next_to_it().into_iter().all(is_full)
+        let around = |distance: usize| {
+            let (column, row) = blocks.place(block);
+            let [left, _, right] = lines_around(column, distance, blocks.across);
+            let [above, _, below] = lines_around(row, distance, blocks.down);
+            [(left, row), (right, row), (column, above), (column, below)]
+                .map(|(column, row)| row * blocks.across + column)
+        };
+        let is_no_more_even = |block: usize| {
+            let EvenWindow { radius, noise, .. } = windows[block];
+            radius < own.radius || own.unevenness <= noise.max(asked.least_noise)
+        };
+        radius >= BLOCK
+            && is_full(block)
+            && is_inside()
+            && around(1).into_iter().all(is_full)
+            && around(radius.div_ceil(BLOCK)).into_iter().all(is_no_more_even)
     }
 
     /// Calls `visit` with the blocks whose windows a block's pixels can take: itself, and those one radius away along
