@@ -179,8 +179,8 @@ fn plane_around(frame: &Pcd, (x, y): (usize, usize), radius: usize) -> Option<([
 fn crease_windows_leave_flat_parts_of_real_frames_smooth() {
     let test = "crease_windows_leave_flat_parts_of_real_frames_smooth";
     for (name, times) in [
-        ("office1", 1.15),
-        ("kinect_capture0001", 0.75),
+        ("office1", 1.2),
+        ("kinect_capture0001", 0.8),
         ("table_scene_mug_stereo_textured", 0.6),
         ("milk_cartoon_all_small_clorox", 0.4),
         ("realsense_d435", 0.65),
@@ -212,6 +212,35 @@ fn crease_windows_leave_flat_parts_of_real_frames_smooth() {
         let what = format!("{name}, {count} pixels: {second:.2} of {single:.2} deg");
         println!("{what}");
         assert!(count > 100 && second <= times * single, "{what}");
+    }
+}
+
+/// A step of a wall that is lost in the noise of windows across it: those beside it are more even.
+#[test]
+fn the_second_pass_keeps_small_steps_sharp() {
+    let camera = camera([160.0, 120.0]);
+    let half = |x: f64, z: f64| {
+        let (origin, u, v) = ([x, -3.0, z], [3.0, 0.0, 0.0], [0.0, 6.0, 0.0]);
+        Shape::Patch { origin, u, v }
+    };
+    for (z, step, noise, times) in [
+        (2.0, 0.01, Noise::Khoshelham, 8.0),
+        (3.0, 0.02, Noise::Khoshelham, 4.0),
+        (4.0, 0.04, Noise::Khoshelham, 8.0),
+        (2.0, 0.015, Noise::Matched, 2.5),
+        (3.0, 0.04, Noise::Matched, 3.0),
+        (4.0, 0.06, Noise::Matched, 2.2),
+    ] {
+        let exact = Scene { shapes: vec![half(-3.0, z), half(0.0, z + step)] }.render(&camera);
+        let frame = noise.apply(&exact, &mut Random::new(1));
+        let is_near = |at: usize| ((at % camera.width) as f64 - camera.center[0]).abs() < 10.0;
+        let [single, second] = [false, true].map(|creases| {
+            let options = options(Method::CovarianceMatrix, false, creases);
+            score(&frame, &normals(&frame.points, frame.width(), options), is_near).mean
+        });
+        let what = format!("{step} m at {z} m, {noise:?}: {second:.2} of {single:.2}");
+        println!("{what} deg");
+        assert!(times * second <= single, "{what}");
     }
 }
 

@@ -33,6 +33,10 @@ pub(crate) const CREASE_COST: f32 = 20.0;
 pub(crate) const ALIKE: f32 = 0.999;
 /// A pixel and those next to it.
 pub(crate) const NEXT: f32 = 9.0;
+/// An edge that noise hides makes windows across it less even than those beside it: no edge is near where a window's variance is
+/// at most this share of what the others' may be of. With more, small steps come out as ramps; with less, what windows differ in
+/// is mistaken for an edge.
+const NO_EDGE: f32 = 0.9;
 /// Depths are exact if more than this share of the windows that a pixel can take says so.
 pub(crate) const EXACT_SHARE: f32 = 0.25;
 
@@ -107,7 +111,7 @@ impl EvenWindows<'_> {
         };
         let is_no_more_even = |block: usize| {
             let EvenWindow { radius, noise, .. } = windows[block];
-            radius < own.radius || own.unevenness <= noise.max(asked.least_noise)
+            radius < own.radius || own.unevenness <= NO_EDGE * noise.max(asked.least_noise)
         };
         radius >= BLOCK
             && is_full(block)
