@@ -195,6 +195,17 @@ fn windows_near_depth_changes_and_creases_equal_the_plain_form() {
     for options in edge_options() {
         worst.check(&cloud, "noise that pixels share", &options);
     }
+    for (seed, period) in [(5, 11), (6, 17), (7, 23)] {
+        let mut cloud = Cloud::new(Kind::NanPixels, 240, 180, seed);
+        for (at, point) in cloud.points.iter_mut().enumerate() {
+            let fold = ((at % 240 + at / 240 / 2) % period).abs_diff(period / 2) as f32;
+            let nearer = 1.0 - 0.003 * fold + random.between(-0.001, 0.001);
+            *point = point.map(|coordinate| coordinate * nearer);
+        }
+        for options in edge_options() {
+            worst.check(&cloud, "relief", &options);
+        }
+    }
     println!("{worst:?}");
 }
 

@@ -19,6 +19,11 @@ const EVEN: f32 = 0.02;
 /// standard deviations of a sample's variance above that of the window of half its radius; and the noise's variance is
 /// taken to be as far above the least one of all windows that a pixel can take.
 pub(crate) const CHANCE: f32 = 3.0;
+/// Relief finer than windows, as stairs far away, makes one hardly less even than that of half its radius. If its variance is
+/// above this many times the least that is told from none (half of alpha squared), and half its radius is this large, it must be
+/// as even as the window of a quarter of its radius too.
+pub(crate) const RELIEF: f64 = 1250.0;
+pub(crate) const RELIEF_RADIUS: u32 = 4;
 /// On steep surfaces the sensor's noise along the rows and columns looks like depth changes. A window with some is
 /// still on one surface if its points deviate from the plane by less than the plane changes in `JAGGED` pixels, and that is
 /// no less than what is told from none. Across a true change, up to a fivefold depth, they deviate by a share of about
@@ -141,11 +146,21 @@ fn find_even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<(EvenW
     };
     let radii = std::iter::successors(Some(wanted), |radius| Some(radius * 7 / 10));
     let mut radii = radii.take_while(|radius| *radius > clean && *radius >= JAGGED_RADIUS);
-    let noise = |plane: &Plane| {
-        let chance = (2.0 * asked.noise_area / (plane.points as f32 - 3.0)).sqrt();
-        plane.unevenness * f64::from(1.0 + CHANCE * chance)
+    // The plane takes as much of the noise's variance as so many points have.
+    let noise_beyond = |plane: &Plane, taken: f32| {
+        let (told, left) = (plane.points as f32 - 3.0, plane.points as f32 - taken);
+        let chance = (2.0 * asked.noise_area / left).sqrt();
+        plane.unevenness * f64::from(told / left * (1.0 + CHANCE * chance))
     };
+    let noise = |plane: &Plane| noise_beyond(plane, 3.0);
     let least_noise = f64::from(asked.least_noise);
+    let in_relief = |found: &Plane, radius: u32| {
+        let is_rough = radius / 2 >= RELIEF_RADIUS && RELIEF * least_noise < found.unevenness;
+        let quarter = is_rough.then(|| plane(radius / 4))??;
+        let taken = 3.0 * asked.noise_area;
+        let is_even = || found.unevenness < noise_beyond(&quarter, taken).max(least_noise);
+        (taken < quarter.points as f32 && !is_even()).then_some(quarter)
+    };
     let found = radii.find_map(jagged);
     let is_jagged = found.is_some();
     let even = || {
@@ -155,6 +170,10 @@ fn find_even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<(EvenW
             && let Some(half) = plane(radius / 2)
         {
             if found.unevenness < noise(&half).max(least_noise) {
+                if let Some(quarter) = in_relief(&found, radius) {
+                    (radius, found) = (radius / 4, quarter);
+                    continue;
+                }
                 let sides2 = [radius, radius / 2].map(|radius| (2 * radius + 1).pow(2));
                 let sides2 = f64::from(sides2[0] - sides2[1]);
                 let bend2 = found.bend2(&half, sides2, least_noise, asked.noise_area.into());

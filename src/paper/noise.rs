@@ -21,8 +21,8 @@ const OWN: f64 = 0.75;
 const ROUND: f64 = 0.08;
 
 /// And in the differences between neighbours more than this share of those between pixels `LAG` apart, however the surface
-/// bends.
-const OWN_DIFFERENCES: f64 = 0.8;
+/// bends: along the rows or down the columns, as relief is seldom across both.
+const OWN_DIFFERENCES: f64 = 0.9;
 const LAG: usize = 3;
 
 /// How many pixels have the same noise: n points tell of a plane as much as that many times fewer with noise of their own.
@@ -37,8 +37,11 @@ pub(crate) fn noise_area(cloud: &Cloud, blocks: &Blocks, clean: &Clean, least_no
     };
     let of_differences = || {
         median(blocks, clean, |pixel| {
-            let [near, far] = [1, LAG].map(|lag| differences(cloud, pixel, lag));
-            Some(near / far).filter(|share| !share.is_nan())
+            let [along, down] = [0, 1].map(|axis| {
+                let [near, far] = [1, LAG].map(|lag| differences(cloud, pixel, axis, lag));
+                near / far
+            });
+            Some(along.max(down)).filter(|_| !along.is_nan() && !down.is_nan())
         })
     };
     let is_shared = of_windows(SMALL).is_some_and(|share| share <= OWN)
@@ -89,19 +92,18 @@ fn points(radius: usize) -> usize {
     (2 * radius + 1).pow(2)
 }
 
-/// The mean square of how far inverse depths are from the mean of those `lag` columns or rows before and behind, around a
-/// pixel; not a number if a point is missing.
-fn differences(cloud: &Cloud, pixel: (usize, usize), lag: usize) -> f64 {
+/// The mean square of how far inverse depths are from the mean of those `lag` columns, axis 0, or rows before and behind,
+/// around a pixel; not a number if a point is missing.
+fn differences(cloud: &Cloud, pixel: (usize, usize), axis: usize, lag: usize) -> f64 {
     let Rect { x: columns, y: rows } = Rect::around(pixel, SMALL[1], (cloud.width, cloud.height));
     let inverse = |x: usize, y: usize| f64::from(inverse_depth(cloud.depths[cloud.index(x, y)]));
+    let [dx, dy] = [[lag, 0], [0, lag]][axis];
     let (mut sum, mut count) = (0.0, 0.0);
-    for (dx, dy) in [(lag, 0), (0, lag)] {
-        for y in rows.start + dy..rows.end.saturating_sub(dy) {
-            for x in columns.start + dx..columns.end.saturating_sub(dx) {
-                let beside = (inverse(x - dx, y - dy) + inverse(x + dx, y + dy)) / 2.0;
-                sum += (inverse(x, y) - beside).powi(2);
-                count += 1.0;
-            }
+    for y in rows.start + dy..rows.end.saturating_sub(dy) {
+        for x in columns.start + dx..columns.end.saturating_sub(dx) {
+            let beside = (inverse(x - dx, y - dy) + inverse(x + dx, y + dy)) / 2.0;
+            sum += (inverse(x, y) - beside).powi(2);
+            count += 1.0;
         }
     }
     sum / count
@@ -116,8 +118,8 @@ mod tests {
     use crate::threads::Workers;
 
     /// The noise area of a surface with inverse depths of 0.5 and so much noise, a mean over `side` x `side` pixels, on top of
-    /// a parabola.
-    fn area(side: usize, noise: f32, bend: f32) -> f32 {
+    /// what `shape` gives.
+    fn area(side: usize, noise: f32, shape: impl Fn([f32; 2]) -> f32) -> f32 {
         let (width, height) = (240, 180);
         let mut bits = 1_u32;
         let mut random = || {
@@ -131,7 +133,7 @@ mod tests {
             let rows = own[y * columns..].chunks(columns).take(side);
             let mean = rows.map(|row| row[x..x + side].iter().sum::<f32>()).sum::<f32>();
             let [u, v] = [(x, width), (y, height)].map(|(at, size)| at as f32 - size as f32 / 2.0);
-            let z = 1.0 / (0.5 + noise * mean / side as f32 + bend * (u * u + v * v));
+            let z = 1.0 / (0.5 + noise * mean / side as f32 + shape([u, v]));
             [u / 525.0 * z, v / 525.0 * z, z]
         };
         let points: Vec<_> = (0..width * height).flat_map(point).collect();
@@ -147,14 +149,30 @@ mod tests {
     #[test]
     fn only_noise_that_neighbours_share_has_an_area() {
         for bend in [0.0, 1e-7, -1e-6] {
-            assert_eq!(area(1, 2e-3, bend), 1.0, "{bend}");
-            assert_eq!(area(5, 0.0, bend), 1.0, "{bend}");
-            let areas = [3, 5, 7].map(|side| area(side, 2e-3, bend));
+            let parabola = |[u, v]: [f32; 2]| bend * (u * u + v * v);
+            assert_eq!(area(1, 2e-3, parabola), 1.0, "{bend}");
+            assert_eq!(area(5, 0.0, parabola), 1.0, "{bend}");
+            let areas = [3, 5, 7].map(|side| area(side, 2e-3, parabola));
             println!("{bend}: {areas:?}");
             for (side, area) in [3, 5, 7].into_iter().zip(areas) {
                 // As means over windows change gradually, a plane follows somewhat less of them.
                 let share = area / (side * side) as f32;
                 assert!((0.4..1.2).contains(&share), "{bend}, {side}: {area}");
+            }
+        }
+    }
+
+    #[test]
+    fn relief_along_one_axis_is_no_noise() {
+        for axis in [0, 1] {
+            for (period, slope) in [(30.0, 3e-4), (20.0, 5e-4), (20.0, 1e-3)] {
+                let folds =
+                    |at: [f32; 2]| slope * (at[axis].rem_euclid(period) - period / 2.0).abs();
+                let what = format!("axis {axis}, {period} px, {slope}");
+                for noise in [0.0, 2e-3] {
+                    assert_eq!(area(1, noise, folds), 1.0, "{what}, noise {noise}");
+                }
+                assert!(area(5, 2e-3, folds) > 10.0, "{what}");
             }
         }
     }

@@ -14,7 +14,8 @@ use crate::fast::sink::Sink;
 use crate::fast::tile::{Bits, all};
 use crate::paper::{
     Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_LINES, JAGGED_POINTS, JAGGED_RADIUS,
-    MIDDLE, Plane, ROUNDING, estimate_in_space, estimate_of, even_window, middle,
+    MIDDLE, Plane, RELIEF, RELIEF_RADIUS, ROUNDING, estimate_in_space, estimate_of, even_window,
+    middle,
 };
 use crate::simd::{GROUP, Groups};
 use crate::vector::dot;
@@ -130,6 +131,24 @@ impl<S: Groups> Fits<S> {
             let chance = Floats::splat(2.0 * area) / (self.points.narrow() - Floats::splat(3.0));
             let chance = Floats::splat(1.0) + Floats::splat(CHANCE) * chance.sqrt();
             self.unevenness * chance.widen()
+        }
+    }
+
+    /// The lanes in which these windows, of a quarter of the others' radii, are more even than chance allows: there is relief.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn are_finer(&self, others: &Self, least: Doubles<S>, area: f32) -> u32 {
+        // SAFETY: as the caller's.
+        unsafe {
+            // As `even_window` has it.
+            let (points, taken) = (self.points.narrow(), Floats::splat(3.0 * area));
+            let (left, one) = (points - taken, Floats::splat(1.0));
+            let chance = one + Floats::splat(CHANCE) * (Floats::splat(2.0 * area) / left).sqrt();
+            let noise = (points - Floats::splat(3.0)) / left * chance;
+            let noise = (self.unevenness * noise.widen()).max(least);
+            self.there & taken.lt(points) & !others.unevenness.lt(noise)
         }
     }
 
@@ -360,6 +379,11 @@ impl EvenTile<'_> {
             let (mut found, mut bend2) = (zero, zero);
             let mut best = Fits::<S>::none();
             let (mut jagged_found, mut doubtful, mut hidden) = (0, 0, 0);
+            // Windows that are even but rough are compared with those of a quarter of their radii.
+            let (rough, mut compared) = (Doubles::splat(RELIEF) * least, 0);
+            // Where noise is shared by as many pixels as such a window has, it tells nothing.
+            let small = (RELIEF_RADIUS as f32 - 1.0).max((3.0 * area).sqrt() - 1.0);
+            let small = Floats::splat(small);
             loop {
                 let todo = jagged | even;
                 if todo == 0 {
@@ -373,9 +397,15 @@ impl EvenTile<'_> {
                     hidden |= fits.hidden & todo;
                 }
                 let is_jagged = jagged & fits.there & self.jagged(&fits, &pixels, radii, y);
-                let is_enough = best.unevenness.lt(fits.noise(area).max(least));
+                let mut is_enough = best.unevenness.lt(fits.noise(area).max(least));
+                // Mostly none is.
+                if compared != 0 {
+                    let in_relief = compared & fits.are_finer(&best, least, area);
+                    is_enough = is_enough & !compared | compared & !in_relief;
+                    bend2.take(S::mask(in_relief), zero);
+                }
                 let is_better = even & fits.there & !is_enough;
-                let bends = even & fits.there & is_enough;
+                let bends = even & fits.there & is_enough & !compared;
                 if bends != 0 {
                     let sides = [found, radii].map(|radii| radii + radii + one);
                     let sides2 = sides[0] * sides[0] - sides[1] * sides[1];
@@ -387,7 +417,8 @@ impl EvenTile<'_> {
                 let seven_tenths = radii * Floats::splat(7.0) / Floats::splat(10.0);
                 let next = Floats(S::truncate(seven_tenths.0));
                 let half = Floats(S::truncate((radii * Floats::splat(0.5)).0));
-                even = is_better & one.lt(radii);
+                compared = bends & small.lt(radii) & rough.lt(best.unevenness);
+                even = is_better & one.lt(radii) | compared;
                 let tried = jagged & !is_jagged;
                 jagged = tried & clean.lt(next) & smallest.lt(next);
                 let starts = tried & !jagged & zero.lt(largest);
