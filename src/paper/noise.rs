@@ -41,7 +41,7 @@ pub(crate) fn noise_area(cloud: &Cloud, blocks: &Blocks, clean: &Clean, least_no
                 let [near, far] = [1, LAG].map(|lag| differences(cloud, pixel, axis, lag));
                 near / far
             });
-            Some(along.max(down)).filter(|_| !along.is_nan() && !down.is_nan())
+            (!along.is_nan() && !down.is_nan()).then(|| along.max(down))
         })
     };
     let is_shared = of_windows(SMALL).is_some_and(|share| share <= OWN)

@@ -128,9 +128,8 @@ impl<S: Groups> Fits<S> {
     unsafe fn noise(&self, area: f32) -> Doubles<S> {
         // SAFETY: as the caller's.
         unsafe {
-            let chance = Floats::splat(2.0 * area) / (self.points.narrow() - Floats::splat(3.0));
-            let chance = Floats::splat(1.0) + Floats::splat(CHANCE) * chance.sqrt();
-            self.unevenness * chance.widen()
+            let left = self.points.narrow() - Floats::splat(3.0);
+            self.unevenness * above_chance(left, area).widen()
         }
     }
 
@@ -144,9 +143,8 @@ impl<S: Groups> Fits<S> {
         unsafe {
             // As `even_window` has it.
             let (points, taken) = (self.points.narrow(), Floats::splat(3.0 * area));
-            let (left, one) = (points - taken, Floats::splat(1.0));
-            let chance = one + Floats::splat(CHANCE) * (Floats::splat(2.0 * area) / left).sqrt();
-            let noise = (points - Floats::splat(3.0)) / left * chance;
+            let (told, left) = (points - Floats::splat(3.0), points - taken);
+            let noise = told / left * above_chance(left, area);
             let noise = (self.unevenness * noise.widen()).max(least);
             self.there & taken.lt(points) & !others.unevenness.lt(noise)
         }
@@ -382,8 +380,7 @@ impl EvenTile<'_> {
             // Windows that are even but rough are compared with those of a quarter of their radii.
             let (rough, mut compared) = (Doubles::splat(RELIEF) * least, 0);
             // Where noise is shared by as many pixels as such a window has, it tells nothing.
-            let small = (RELIEF_RADIUS as f32 - 1.0).max((3.0 * area).sqrt() - 1.0);
-            let small = Floats::splat(small);
+            let small = Floats::splat((RELIEF_RADIUS as f32).max((3.0 * area).sqrt()) - 1.0);
             loop {
                 let todo = jagged | even;
                 if todo == 0 {
@@ -564,6 +561,20 @@ impl EvenTile<'_> {
             let least = Doubles::splat(self.even.asked.least_noise.into());
             !steep.lt(fits.unevenness) & !steep.lt(least) & !fits.points.lt(fewest)
         }
+    }
+}
+
+/// How many times a sample's variance the noise's may be by chance, where so many points are left to tell it and `area` of them
+/// have the same noise.
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+unsafe fn above_chance<S: Groups>(left: Floats<S>, area: f32) -> Floats<S> {
+    // SAFETY: as the caller's.
+    unsafe {
+        let deviation = (Floats::splat(2.0 * area) / left).sqrt();
+        Floats::splat(1.0) + Floats::splat(CHANCE) * deviation
     }
 }
 
