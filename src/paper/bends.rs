@@ -132,16 +132,13 @@ fn bend(points: &SummedArea<4>, blocks: &Blocks, block: (usize, usize), reach: u
     let [middle, window] =
         if reach == 1 { [around(0), nine] } else { [around(reach / 2), around(reach)] };
     // Numbers of points are exact.
-    let Some(normal) = normal(halves).filter(|_| middle[3] > 0.0) else {
+    let Some((normal, length2)) = normal(halves).filter(|_| middle[3] > 0.0) else {
         return f64::NAN;
     };
-    let mean = |[x, y, z, count]: Sum| {
-        let share = 1.0 / count;
-        [x * share, y * share, z * share]
-    };
-    let out = dot(normal, difference(mean(middle), mean(window)));
+    let out = dot(normal, way(window, middle));
     let side2 = |reach: usize| ((2 * reach + 1) * (2 * reach + 1)) as f64;
-    out / (side2(reach) - side2(reach / 2))
+    let sides2 = side2(reach) - side2(reach / 2);
+    out / (middle[3] * window[3] * length2.sqrt() * sides2)
 }
 
 /// The sums of a block and the eight around it, in halves: left and right of its column, above and below its row; and all
@@ -169,20 +166,23 @@ fn halves(
 }
 
 /// Across the ways from the mean of the left half to that of the right one, and from above to below: the mean 3-D gradients.
+/// And the square of its length.
 #[inline(always)]
-fn normal(halves: [[Sum; 2]; 2]) -> Option<[f64; 3]> {
+fn normal(halves: [[Sum; 2]; 2]) -> Option<([f64; 3], f64)> {
     // Of a half without points rounding may be left.
     if halves.as_flattened().iter().any(|[_, _, _, count]| *count == 0.0) {
         return None;
     }
-    // As long as the numbers of points make them: means would take divisions.
-    let [u, v] = halves.map(|[[a, b, c, before], [d, e, f, behind]]| {
-        [d * before - a * behind, e * before - b * behind, f * before - c * behind]
-    });
+    let [u, v] = halves.map(|[before, behind]| way(before, behind));
     let normal = cross(v, u);
     let length2 = dot(normal, normal);
-    let scale = 1.0 / length2.sqrt();
-    is_length(length2).then(|| normal.map(|n| n * scale))
+    is_length(length2).then_some((normal, length2))
+}
+
+/// The way from the mean of some points to that of others, times the numbers of both: means would take divisions.
+#[inline(always)]
+fn way([a, b, c, from]: Sum, [d, e, f, to]: Sum) -> [f64; 3] {
+    [d * from - a * to, e * from - b * to, f * from - c * to]
 }
 
 #[cfg(test)]
@@ -237,7 +237,7 @@ mod tests {
     fn a_half_without_points_gives_no_normal() {
         let below = [[0.0, 0.0, 2.0, 1.0], [0.0, 1.0, 2.0, 1.0]];
         let there = [[0.0, 0.0, 2.0, 1.0], [1.0, 0.0, 2.0, 1.0]];
-        assert_eq!(normal([there, below]), Some([0.0, 0.0, -1.0]));
+        assert_eq!(normal([there, below]), Some(([0.0, 0.0, -1.0], 1.0)));
         let rounding = [[1e-9, 2e-9, 3e-9, 0.0], there[1]];
         assert_eq!(normal([rounding, below]), None);
     }

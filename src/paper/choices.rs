@@ -89,9 +89,10 @@ impl EvenWindows<'_> {
 
     /// Whether a block's window is whole, as large as it may be, as those next to it are, and reaches beyond the block, and those
     /// one radius away that are as large are no more even: no edge is near.
-    pub fn is_far_from_edges(&self, block: usize) -> bool {
+    pub fn is_far_from_edges(&self, (column, row): (usize, usize)) -> bool {
         let EvenWindows { cloud, asked, windows, .. } = self;
         let blocks = &asked.blocks;
+        let block = row * blocks.across + column;
         let is_full = |block: usize| {
             let radius = self.radius(block);
             radius > 0 && radius >= asked.largest(block)
@@ -99,11 +100,10 @@ impl EvenWindows<'_> {
         let own = &windows[block];
         let radius = own.radius as usize;
         let is_inside = || {
-            let (x, y) = blocks.middle(block);
+            let (x, y) = blocks.middle_of((column, row));
             radius <= x && x + radius < cloud.width && radius <= y && y + radius < cloud.height
         };
         let around = |distance: usize| {
-            let (column, row) = blocks.place(block);
             let [left, _, right] = lines_around(column, distance, blocks.across);
             let [above, _, below] = lines_around(row, distance, blocks.down);
             [(left, row), (right, row), (column, above), (column, below)]
@@ -147,7 +147,7 @@ impl EvenWindows<'_> {
         for (block, _) in levels.filter(|(_, level)| **level > 0) {
             let place = self.asked.blocks.place(block);
             let pixels = self.pixels_that_take(place);
-            if self.is_far_from_edges(block) {
+            if self.is_far_from_edges(place) {
                 pixels.for_each(|(x, y)| choices[self.cloud.index(x, y)] = block as u32);
             } else {
                 Candidates::of(self, block).choose(pixels, choices);

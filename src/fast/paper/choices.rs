@@ -43,7 +43,7 @@ pub(super) unsafe fn rows<S: Groups>(
         let levels = &even.levels[row * across..][..across];
         concerned.clear();
         for column in (0..across).filter(|column| levels[*column] > 0) {
-            if even.is_far_from_edges(row * across + column) {
+            if even.is_far_from_edges((column, row)) {
                 take_own(even, (column, row), choices);
             } else {
                 concerned.push(column);

@@ -30,25 +30,48 @@ pub(crate) unsafe fn read<S: Along>(
     let points = points.row(y, 0..width);
     // SAFETY: as the caller's; all lanes lie inside the depths.
     unsafe {
-        let none = S::splat(f32::NAN);
-        let (mut nearest, mut deepest) = (S::splat(f32::INFINITY), S::splat(0.0));
         for x in points.starts::<S>() {
-            let [px, py, pz] = points.lanes::<S>(x);
-            let there = there::<S>([px, py, pz], options);
-            let depth = depth::<S>([px, py, pz], range);
-            S::store(depths.as_mut_ptr().add(x), S::select(there, depth, none));
-            let magnitude = S::abs(depth);
+            let point = points.lanes::<S>(x);
+            let (none, there) = (S::splat(f32::NAN), there::<S>(point, options));
+            let depth = S::select(there, depth::<S>(point, range), none);
+            S::store(depths.as_mut_ptr().add(x), depth);
+        }
+        depths[width..].fill(f32::NAN);
+        magnitudes::<S>(depths)
+    }
+}
+
+/// The least and the largest magnitude in a row of depths.
+///
+/// # Safety
+/// The processor has the instruction set of `S`; the row has whole pairs of groups.
+#[inline(always)]
+unsafe fn magnitudes<S: Along>(depths: &[f32]) -> [f32; 2] {
+    // SAFETY: as the caller's.
+    unsafe {
+        let (mut nearest, mut deepest) = (S::splat(f32::INFINITY), S::splat(0.0));
+        for depths in depths.chunks_exact(S::LANES) {
+            let depth = S::load(depths.as_ptr());
+            let (there, magnitude) = (S::eq(depth, depth), S::abs(depth));
             nearest = S::min(S::select(there, magnitude, nearest), nearest);
             deepest = S::max(S::and(there, magnitude), deepest);
         }
-        depths[width..].fill(f32::NAN);
         [Floats::<S>(nearest).least(), Floats::<S>(deepest).largest()]
     }
 }
 
+/// Where a row of points is read from and to.
+pub(crate) struct OneRow<'a> {
+    pub from: PointRow<'a>,
+    pub points: &'a mut [[f32; 3]],
+    pub depths: &'a mut [f32],
+    /// What [`read`] fills and what it returns, if that is asked for.
+    pub padded: Option<(&'a mut [f32], &'a mut [f32; 2])>,
+}
+
 /// Rows of points, `BLOCK` or those that are left, where they are read from and to.
 pub(crate) struct PointRows<'a> {
-    pub rows: &'a mut dyn Iterator<Item = (PointRow<'a>, &'a mut [[f32; 3]], &'a mut [f32])>,
+    pub rows: &'a mut dyn Iterator<Item = OneRow<'a>>,
     /// As [`Cloud::sums`](crate::paper::Cloud::sums), or none.
     pub sums: &'a mut [[f32; 4]],
     /// Room for sums down the columns, as [`room_for_columns`] says.
@@ -83,9 +106,15 @@ impl PointRows<'_> {
         let columns = &mut columns[..room_for_columns(sums.len())];
         let plane = columns.len() / 4;
         columns.fill(0.0);
-        for (row, to, depths) in rows {
+        for OneRow { from, points, depths, padded } in rows {
             // SAFETY: as the caller's.
-            unsafe { read_points::<S>(&row, options, range, to, depths, columns) };
+            unsafe { read_points::<S>(&from, options, range, points, depths, columns) };
+            if let Some((padded, range)) = padded {
+                padded[..depths.len()].copy_from_slice(depths);
+                padded[depths.len()..].fill(f32::NAN);
+                // SAFETY: as the caller's.
+                *range = unsafe { magnitudes::<S>(padded) };
+            }
         }
         let columns = columns.as_ptr();
         for (group, sums) in sums.chunks_mut(S::LANES).enumerate() {

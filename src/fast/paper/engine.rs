@@ -25,10 +25,7 @@ impl Engine for FastEngine<'_> {
     fn sizes(&mut self, sizes: &mut Vec<f32>) -> Result<(), Error> {
         let FastEngine { job, scratch, .. } = self;
         match job.options.semantics {
-            Semantics::Pcl => {
-                job.depths(scratch)?;
-                sides(job.isa, job.points, job.options, sizes, scratch)
-            }
+            Semantics::Pcl => sides(job.isa, job.points, job.options, sizes, scratch),
             Semantics::Paper => radii(job, sizes, scratch),
         }
     }

@@ -24,7 +24,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 pub(crate) use engine::FastEngine;
 
 use chosen::ChosenRow;
-use depths::{PointRows, room_for_columns, row_length};
+use depths::{OneRow, PointRows, room_for_columns, row_length};
 use even_windows::{Even, EvenTile};
 use integrals::{Rings, elements_of_rings, presence_of_rings, reached, rows_of_rings};
 use layers::{Layer, Waiting};
@@ -79,6 +79,18 @@ pub(crate) struct Scratch {
 }
 
 impl Scratch {
+    /// The rows of depths of a cloud's points, to be read.
+    fn rows(
+        &mut self,
+        points: &Points,
+    ) -> Result<impl Iterator<Item = (&mut [f32], &mut [f32; 2])> + Send, Error> {
+        let Scratch { depths, ranges, .. } = self;
+        let (length, height) = (row_length(points.width()), points.height());
+        depths.grow(length * height)?;
+        resize(ranges, height, [0.0; 2])?;
+        Ok(depths[..length * height].chunks_mut(length).zip(ranges))
+    }
+
     /// Bytes held.
     pub fn size(&self) -> usize {
         let Scratch { depths, ranges, radii, chunks, taken, .. } = self;
@@ -123,10 +135,9 @@ pub(crate) fn compute(
     job.tiles(scratch, indices, normals, None)
 }
 
-/// Reads the depths, and finds the radii of all pixels' windows, row by row, 0 for none.
+/// The radii of all pixels' windows, row by row, 0 for none; the depths have been read.
 fn radii(job: &Job, found: &mut Vec<f32>, scratch: &mut super::Scratch) -> Result<(), Error> {
     let &Job { points, .. } = job;
-    job.depths(scratch)?;
     job.radii(scratch)?;
     let length = row_length(points.width());
     let Scratch { chunks, radii: map, .. } = &scratch.paper;
@@ -177,7 +188,7 @@ pub(crate) fn write_chosen(
     });
 }
 
-/// Makes a cloud that of the job's points, as [`Cloud::read`].
+/// Makes a cloud that of the job's points, as [`Cloud::read`]. If it is to have a second pass, the job's depths are read too.
 pub(crate) fn read_cloud(
     job: &Job,
     cloud: &mut Cloud,
@@ -185,8 +196,9 @@ pub(crate) fn read_cloud(
 ) -> Result<(), Error> {
     let &Job { isa, points, options } = job;
     cloud.resize(points, options)?;
-    let super::Scratch { workers, each, .. } = scratch;
+    let super::Scratch { workers, each, paper, .. } = scratch;
     let &mut Cloud { width, height, has_range, .. } = cloud;
+    let mut padded = if options.has_second_pass() { Some(paper.rows(points)?) } else { None };
     let across = Blocks::of(width, height).across;
     for scratch in &each[..workers.count()] {
         lock(scratch).paper.columns.grow(room_for_columns(across))?;
@@ -194,13 +206,18 @@ pub(crate) fn read_cloud(
     let rows = cloud.points.chunks_mut(BLOCK * width);
     let rows = rows.zip(cloud.depths.chunks_mut(BLOCK * width));
     let sums = cloud.sums.chunks_mut(across).chain(repeat_with(Default::default));
-    let rows = rows.zip(sums).enumerate();
+    let padded = std::iter::from_fn(|| {
+        Some(std::array::from_fn::<_, BLOCK, _>(|_| padded.as_mut().and_then(Iterator::next)))
+    });
+    let rows = rows.zip(sums).zip(padded).enumerate();
     workers.share(rows, |worker, rows| {
         let columns = &mut lock(&each[worker]).paper.columns;
-        for (row, ((to, depths), sums)) in rows {
-            let rows = to.chunks_mut(width).zip(depths.chunks_mut(width)).enumerate();
-            let mut rows = rows
-                .map(|(line, (to, depths))| (points.row(row * BLOCK + line, 0..width), to, depths));
+        for (row, (((to, depths), sums), padded)) in rows {
+            let rows = to.chunks_mut(width).zip(depths.chunks_mut(width)).zip(padded).enumerate();
+            let mut rows = rows.map(|(line, ((to, depths), padded))| {
+                let from = points.row(row * BLOCK + line, 0..width);
+                OneRow { from, points: to, depths, padded }
+            });
             let rows = PointRows { rows: &mut rows, sums, columns, options, range: has_range };
             // SAFETY: the processor has the instruction set.
             unsafe { paths::run(isa, rows) };
@@ -368,17 +385,13 @@ pub(crate) struct Job<'a> {
 
 // The stages are not inlined: profiles and the test of instruction counts tell them by name.
 impl Job<'_> {
-    /// All rows of depths, for [`even_windows`] too.
+    /// All rows of depths.
     #[inline(never)]
     pub fn depths(&self, scratch: &mut super::Scratch) -> Result<(), Error> {
         let &Job { points, options, .. } = self;
         scratch.prepare(options.threads)?;
         let super::Scratch { workers, paper, .. } = scratch;
-        let length = row_length(points.width());
-        paper.depths.grow(length * points.height())?;
-        resize(&mut paper.ranges, points.height(), [0.0; 2])?;
-        let rows = paper.depths[..length * points.height()].chunks_mut(length);
-        workers.each(rows.zip(&mut paper.ranges).enumerate(), |(y, (depths, range))| {
+        workers.each(paper.rows(points)?.enumerate(), |(y, (depths, range))| {
             let task = DepthsTask { points, options, y, depths };
             // SAFETY: the processor has the instruction set.
             *range = unsafe { paths::run(self.isa, task) };
