@@ -277,9 +277,9 @@ impl Estimator {
         cloud.read(points, options)?;
         let points = &packed(cloud);
         let workers = scratch.workers();
-        let mut engine = PlainEngine { points, options, workers };
+        let mut engine = PlainEngine { points, options, workers, sizes: Vec::new() };
         second_pass.compute(cloud, options, &mut engine)?;
-        let own = engine.own(second_pass.sizes())?;
+        let own = engine.own()?;
         write(normals, indices, cloud.width, workers, |_, at| {
             Some(second_pass.chosen(cloud, options, at).unwrap_or_else(|| own(at)))
         });
@@ -315,15 +315,18 @@ impl Estimator {
         } else if !is_along {
             fast::paper::compute_own(&job, second_pass.choices(), indices, normals, scratch)?;
         }
-        let workers = scratch.workers();
+        let (scratch, workers, width) = (&*scratch, scratch.workers(), cloud.width);
         let of_left = is_along.then_some(points);
         if indices.is_none() {
-            fast::paper::write_chosen(&job, second_pass, cloud, normals, of_left, workers);
+            fast::paper::write_chosen(&job, second_pass, cloud, normals, of_left, scratch);
             return Ok(());
         }
         let chosen = |at| second_pass.chosen(cloud, options, at);
-        let left = |at| second_pass.left(of_left?, options, at);
-        write(normals, indices, cloud.width, workers, |_, at| chosen(at).or_else(|| left(at)));
+        let left = |at| {
+            let pixel = (at % width, at / width);
+            second_pass.left(of_left?, options, pixel, job.sizes(scratch, pixel.1))
+        };
+        write(normals, indices, width, workers, |_, at| chosen(at).or_else(|| left(at)));
         write_around(cloud, options, second_pass, indices, normals, workers);
         Ok(())
     }

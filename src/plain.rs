@@ -74,12 +74,14 @@ pub(crate) struct PlainEngine<'a> {
     pub points: &'a Points<'a>,
     pub options: &'a Options,
     pub workers: &'a Workers,
+    /// Row by row, as [`Engine::sizes`](paper::Engine::sizes).
+    pub sizes: Vec<f32>,
 }
 
 impl PlainEngine<'_> {
-    /// The pixels' own estimates, from windows of these sizes.
-    pub fn own(&self, sizes: &[f32]) -> Result<impl Fn(usize) -> Estimate + Sync, Error> {
-        let &PlainEngine { points, options, .. } = self;
+    /// The pixels' own estimates.
+    pub fn own(&self) -> Result<impl Fn(usize) -> Estimate + Sync, Error> {
+        let &PlainEngine { points, options, ref sizes, .. } = self;
         let width = points.width();
         let is_pcl = options.semantics == Semantics::Pcl;
         let of_pcl = is_pcl.then(|| Plain::new(points, options)).transpose()?;
@@ -96,8 +98,8 @@ impl paper::Engine for PlainEngine<'_> {
         self.workers
     }
 
-    fn sizes(&mut self, sizes: &mut Vec<f32>) -> Result<(), Error> {
-        let &mut PlainEngine { points, options, .. } = self;
+    fn find_sizes(&mut self) -> Result<(), Error> {
+        let &mut PlainEngine { points, options, ref mut sizes, .. } = self;
         let (width, height) = (points.width(), points.height());
         match options.semantics {
             Semantics::Pcl => {
@@ -110,6 +112,11 @@ impl paper::Engine for PlainEngine<'_> {
                 refill(sizes, maps.smoothing_radii.iter().map(|radius| radius.trunc()))
             }
         }
+    }
+
+    fn sizes(&self, y: usize) -> &[f32] {
+        let width = self.points.width();
+        &self.sizes[y * width..][..width]
     }
 
     fn find_depth_changes(&self, changes: &mut DepthChanges, cloud: &Cloud) -> Result<(), Error> {

@@ -47,7 +47,7 @@ use windows::{Sides, Windows, reach};
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
-use crate::memory::{bytes, resize};
+use crate::memory::bytes;
 use crate::options::{Method, Options};
 use crate::simd::{GROUP, Groups};
 use crate::threads::Workers;
@@ -197,25 +197,21 @@ pub(crate) fn compute(
     compute_slices(isa, points, options, output, |_, _| (), scratch)
 }
 
-/// The sides of all pixels' windows, row by row, 0 for none.
-fn sides(
-    isa: Isa,
-    points: &Points,
-    options: &Options,
-    found: &mut Vec<f32>,
-    scratch: &mut Scratch,
-) -> Result<(), Error> {
+/// The sides of all pixels' windows, 0 for none, in place of the paper's radii.
+fn sides(isa: Isa, points: &Points, options: &Options, scratch: &mut Scratch) -> Result<(), Error> {
     let width = points.width();
-    resize(found, width * points.height(), 0.0)?;
-    let found = Parts(found.as_mut_ptr());
-    let read = |rows: Range<usize>, sides: Sides| {
-        for y in rows {
+    let (mut found, length) = scratch.paper.take_sizes(points)?;
+    let rows = Parts(found.as_mut_ptr());
+    let read = |of_slice: Range<usize>, sides: Sides| {
+        for y in of_slice {
             // SAFETY: the row is in the image, and of one slice.
-            let to = unsafe { found.part(y * width..(y + 1) * width) };
+            let to = unsafe { rows.part(y * length..y * length + width) };
             to.copy_from_slice(&sides.row(y)[..width]);
         }
     };
-    compute_slices(isa, points, options, None, read, scratch)
+    compute_slices(isa, points, options, None, read, scratch)?;
+    scratch.paper.radii = found;
+    Ok(())
 }
 
 /// As [`compute`], if there is an output; gives every slice's rows and the sides of their windows to `read`.

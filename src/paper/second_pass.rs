@@ -22,12 +22,15 @@ use crate::threads::Workers;
 
 /// How windows and their estimates are computed: by the plain forms, or fast. Estimates are normals, not turned, and
 /// curvatures.
-pub(crate) trait Engine {
+pub(crate) trait Engine: Sync {
     /// The threads.
     fn workers(&self) -> &Workers;
 
-    /// The size of every pixel's own window, as [`Windows`] has them.
-    fn sizes(&mut self, sizes: &mut Vec<f32>) -> Result<(), Error>;
+    /// Finds the sizes of all pixels' own windows.
+    fn find_sizes(&mut self) -> Result<(), Error>;
+
+    /// Those that were found of a row's pixels: whole numbers, 0 for none, as a radius, or in PCL's semantics as a side.
+    fn sizes(&self, y: usize) -> &[f32];
 
     /// The depth changes of a cloud.
     fn find_depth_changes(&self, changes: &mut DepthChanges, cloud: &Cloud) -> Result<(), Error>;
@@ -46,12 +49,9 @@ pub(crate) trait Engine {
     fn choices(&mut self, even: &EvenWindows, choices: &mut [u32]);
 }
 
-/// The windows, and what they give.
+/// The even windows, block by block, and what they give.
 #[derive(Debug, Default)]
 pub(crate) struct Windows {
-    /// Of the pixels' own, whole numbers: 0 for none, as a radius, or in PCL's semantics as a side.
-    pub sizes: Vec<f32>,
-    /// Block by block.
     pub even: Vec<EvenWindow>,
     pub of_even: Vec<[f32; 4]>,
 }
@@ -59,8 +59,8 @@ pub(crate) struct Windows {
 impl Windows {
     /// Bytes held.
     fn size(&self) -> usize {
-        let Windows { sizes, even, of_even } = self;
-        bytes(sizes) + bytes(even) + bytes(of_even)
+        let Windows { even, of_even } = self;
+        bytes(even) + bytes(of_even)
     }
 }
 
@@ -108,7 +108,7 @@ impl SecondPass {
         engine: &mut impl Engine,
     ) -> Result<(), Error> {
         let SecondPass { depth_changes, wanted, windows, bends, concerned, levels, .. } = self;
-        engine.sizes(&mut windows.sizes)?;
+        engine.find_sizes()?;
         if !options.has_second_pass() {
             return refill(&mut self.choices, repeat_n(NO_WINDOW, cloud.depths.len()));
         }
@@ -135,7 +135,8 @@ impl SecondPass {
         bends.find(cloud, options.paper.alpha, &blocks, reach, engine.workers())?;
         concerned.clear(size)?;
         refill(levels, repeat_n(0, blocks.count()))?;
-        let concern = Concern { cloud, options, asked: &asked, sizes: &windows.sizes, bends };
+        let sizes = &|y: usize| engine.sizes(y);
+        let concern = Concern { cloud, options, asked: &asked, sizes, bends };
         concern.find(concerned, levels, engine.workers());
         resize(&mut self.choices, cloud.depths.len(), NO_WINDOW)?;
         engine.even_windows(cloud, &asked, concerned, windows)?;
@@ -152,11 +153,6 @@ impl SecondPass {
             }
         }
         Ok(())
-    }
-
-    /// The sizes of the pixels' own windows, as [`Windows`] has them.
-    pub fn sizes(&self) -> &[f32] {
-        &self.windows.sizes
     }
 
     /// The blocks whose even windows the pixels take, or [`NO_WINDOW`]: then what counts is the own one.
@@ -181,11 +177,18 @@ impl SecondPass {
         Some(turn_to_viewpoint(found, cloud.points[at], options.viewpoint))
     }
 
-    /// The estimate, in the paper's semantics, of a pixel that could take an even window but takes none.
-    pub fn left(&self, points: &Points, options: &Options, at: usize) -> Option<Estimate> {
-        let pixel = (at % points.width(), at / points.width());
-        let is_left = self.concerned.has(pixel) && self.choices[at] == NO_WINDOW;
-        is_left.then(|| of_radius(points, options, pixel, self.windows.sizes[at] as u32))
+    /// The estimate, in the paper's semantics, of a pixel that could take an even window but takes none, where its row's pixels
+    /// have windows of these sizes.
+    pub fn left(
+        &self,
+        points: &Points,
+        options: &Options,
+        (x, y): (usize, usize),
+        sizes: &[f32],
+    ) -> Option<Estimate> {
+        let choice = self.choices[y * points.width() + x];
+        let is_left = self.concerned.has((x, y)) && choice == NO_WINDOW;
+        is_left.then(|| of_radius(points, options, (x, y), sizes[x] as u32))
     }
 
     /// The estimate of a pixel that has a point but no normal, as `has_normal` says if no even window gave one: that of the
@@ -222,8 +225,8 @@ struct Concern<'a> {
     cloud: &'a Cloud,
     options: &'a Options,
     asked: &'a Asked<'a>,
-    /// As [`Windows`] has them.
-    sizes: &'a [f32],
+    /// As [`Engine::sizes`].
+    sizes: &'a (dyn Fn(usize) -> &'a [f32] + Sync),
     bends: &'a Bends,
 }
 
@@ -252,9 +255,9 @@ impl Concern<'_> {
     ) {
         let &Concern { cloud, options, asked, bends, .. } = self;
         let columns = word * WORD..cloud.width.min((word + 1) * WORD);
-        let mut lines = [const { 0..0 }; BLOCK];
+        let mut lines = [const { (0, 0..0) }; BLOCK];
         for (line, y) in lines.iter_mut().zip(row * BLOCK..cloud.height) {
-            *line = y * cloud.width + columns.start..y * cloud.width + columns.end;
+            *line = (y, columns.clone());
         }
         let any = |of_lines: &[u64; BLOCK]| of_lines.iter().fold(0, |any, marks| any | marks);
         let mut small = 0;
@@ -283,17 +286,18 @@ impl Concern<'_> {
         }
     }
 
-    /// The marks of the pixels that have a window.
-    fn with_windows(&self, pixels: Range<usize>) -> u64 {
-        word_of(self.sizes[pixels].iter().map(|size| *size > 0.0))
+    /// The marks of the pixels of a row, in these columns, that have a window.
+    fn with_windows(&self, (y, columns): (usize, Range<usize>)) -> u64 {
+        word_of((self.sizes)(y)[columns].iter().map(|size| *size > 0.0))
     }
 
-    /// The marks of the pixels whose windows are smaller than this share of what their depths ask for.
-    fn with_windows_below(&self, share: f32, pixels: Range<usize>) -> u64 {
+    /// Those whose windows are smaller than this share of what their depths ask for.
+    fn with_windows_below(&self, share: f32, (y, columns): (usize, Range<usize>)) -> u64 {
         let &Concern { cloud, sizes, .. } = self;
+        let depths = &cloud.depths[y * cloud.width..][columns.clone()];
         // The loop's own: it is vectorized.
         let options = self.options.clone();
-        let found = cloud.depths[pixels.clone()].iter().zip(&sizes[pixels]);
+        let found = depths.iter().zip(&sizes(y)[columns]);
         // Sizes are whole numbers.
         word_of(found.map(|(depth, size)| size + 1.0 <= share * wanted_size(*depth, &options)))
     }
@@ -334,8 +338,8 @@ fn find_wanted(
     Ok(())
 }
 
-/// The size that the window of a pixel of this depth has far from any depth change, as [`Windows`] has them but for
-/// a fraction.
+/// The size that the window of a pixel of this depth has far from any depth change, as [`Engine::sizes`] has it but
+/// for a fraction.
 fn wanted_size(depth: f32, options: &Options) -> f32 {
     match options.semantics {
         Semantics::Paper => smoothing_area::depth_radius(depth, &options.paper),
@@ -343,7 +347,7 @@ fn wanted_size(depth: f32, options: &Options) -> f32 {
     }
 }
 
-/// The radius of a window of a size as [`Windows`] has them, at most the largest of all.
+/// The radius of a window of a size as [`Engine::sizes`] has it, at most the largest of all.
 fn radius_of_size(size: f32, options: &Options) -> u32 {
     let radius = match options.semantics {
         Semantics::Paper => size as u32,

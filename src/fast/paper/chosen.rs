@@ -17,8 +17,9 @@ pub(super) struct ChosenRow<'a> {
     pub second_pass: &'a SecondPass,
     pub normals: &'a Normals<'a>,
     pub y: usize,
-    /// The points, if pixels that could take a window but take none are to be written too.
-    pub of_left: Option<&'a Points<'a>>,
+    /// The points and the sizes of the row's windows, if pixels that could take an even window but take none are to be written
+    /// too.
+    pub of_left: Option<(&'a Points<'a>, &'a [f32])>,
 }
 
 /// Writes them; the others stay as they are, but with one-sided windows those without a normal get one from the points
@@ -120,7 +121,10 @@ impl ChosenRow<'_> {
     fn write_one(&self, x: usize) {
         let &ChosenRow { cloud, options, second_pass, normals, y, of_left } = self;
         let at = y * cloud.width + x;
-        let left = || second_pass.left(of_left?, options, at);
+        let left = || {
+            let (points, sizes) = of_left?;
+            second_pass.left(points, options, (x, y), sizes)
+        };
         if let Some(found) = second_pass.chosen(cloud, options, at).or_else(left) {
             // SAFETY: as the caller's of `write`.
             unsafe { normals.write(x, y, found.normal, found.curvature) };

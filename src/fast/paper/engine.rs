@@ -1,6 +1,6 @@
 //! What the second pass builds on, fast.
 
-use super::{Job, Own, choices, even_windows, find_depth_changes, radii};
+use super::{Job, Own, choices, even_windows, find_depth_changes};
 use crate::Error;
 use crate::cloud::Normals;
 use crate::fast::{Scratch, sides};
@@ -22,12 +22,16 @@ impl Engine for FastEngine<'_> {
         self.scratch.workers()
     }
 
-    fn sizes(&mut self, sizes: &mut Vec<f32>) -> Result<(), Error> {
+    fn find_sizes(&mut self) -> Result<(), Error> {
         let FastEngine { job, scratch, .. } = self;
         match job.options.semantics {
-            Semantics::Pcl => sides(job.isa, job.points, job.options, sizes, scratch),
-            Semantics::Paper => radii(job, sizes, scratch),
+            Semantics::Pcl => sides(job.isa, job.points, job.options, scratch),
+            Semantics::Paper => job.radii(scratch),
         }
+    }
+
+    fn sizes(&self, y: usize) -> &[f32] {
+        self.job.sizes(self.scratch, y)
     }
 
     fn find_depth_changes(&self, changes: &mut DepthChanges, cloud: &Cloud) -> Result<(), Error> {

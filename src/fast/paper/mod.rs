@@ -39,7 +39,7 @@ use super::{Parts, lock};
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
-use crate::memory::{bytes, make_room, refill, resize};
+use crate::memory::{bytes, refill, resize};
 use crate::methods::Estimate;
 use crate::options::{DistanceMetric, Method, Options};
 use crate::paper::{
@@ -70,7 +70,8 @@ pub(crate) struct Scratch {
     depths: Buffer<f32>,
     /// Row by row the least and the largest of their magnitudes.
     ranges: Vec<[f32; 2]>,
-    radii: Buffer<f32>,
+    /// 0 for none; for the second pass in PCL's semantics, the windows' sides.
+    pub radii: Buffer<f32>,
     /// The largest of them.
     largest: usize,
     chunks: Vec<Chunk>,
@@ -89,6 +90,15 @@ impl Scratch {
         depths.grow(length * height)?;
         resize(ranges, height, [0.0; 2])?;
         Ok(depths[..length * height].chunks_mut(length).zip(ranges))
+    }
+
+    /// Rows for the sizes of the windows of a cloud's pixels, to be filled and put back, and the elements from one row to the next.
+    pub fn take_sizes(&mut self, points: &Points) -> Result<(Buffer<f32>, usize), Error> {
+        let Scratch { radii, chunks, .. } = self;
+        let (length, height) = (row_length(points.width()), points.height());
+        share_out(height, 1, height, chunks)?;
+        radii.grow(length * height)?;
+        Ok((std::mem::take(radii), length))
     }
 
     /// Bytes held.
@@ -135,21 +145,8 @@ pub(crate) fn compute(
     job.tiles(scratch, indices, normals, None)
 }
 
-/// The radii of all pixels' windows, row by row, 0 for none; the depths have been read.
-fn radii(job: &Job, found: &mut Vec<f32>, scratch: &mut super::Scratch) -> Result<(), Error> {
-    let &Job { points, .. } = job;
-    job.radii(scratch)?;
-    let length = row_length(points.width());
-    let Scratch { chunks, radii: map, .. } = &scratch.paper;
-    make_room(found, points.width() * points.height())?;
-    for place in chunks.iter().flat_map(|chunk| chunk.own.clone().map(|y| chunk.place(y))) {
-        found.extend_from_slice(&map[place * length..][..points.width()]);
-    }
-    Ok(())
-}
-
-/// As [`compute`], of the pixels that take no even window; the others are not written. Their windows are those that [`radii`]
-/// has found.
+/// As [`compute`], of the pixels that take no even window; the others are not written. Their windows are those that
+/// [`Job::radii`] has found.
 pub(crate) fn compute_own(
     job: &Job,
     choices: &[u32],
@@ -178,10 +175,11 @@ pub(crate) fn write_chosen(
     cloud: &Cloud,
     normals: &Normals,
     of_left: Option<&Points>,
-    workers: &Workers,
+    scratch: &super::Scratch,
 ) {
     let options = job.options;
-    workers.for_each(cloud.height, |_, y| {
+    scratch.workers.for_each(cloud.height, |_, y| {
+        let of_left = of_left.map(|points| (points, job.sizes(scratch, y)));
         let row = ChosenRow { cloud, options, second_pass, normals, y, of_left };
         // SAFETY: the processor has the instruction set, and every row falls to one thread.
         unsafe { paths::run(job.isa, row) };
@@ -253,7 +251,7 @@ struct Own<'a> {
 }
 
 /// The even windows of all blocks and their estimates, and in the paper's semantics, if they are asked for, pixels' `own`;
-/// the job's method is CM. The depths have been read, and the pixels' own windows are those that [`radii`] has found.
+/// the job's method is CM. The depths have been read, and the pixels' own windows are those that [`Job::radii`] has found.
 /// Afterwards there is room for [`choices`].
 fn even_windows(
     job: &Job,
@@ -448,6 +446,11 @@ impl Job<'_> {
         }
         *of_all = largest.into_inner() as usize;
         Ok(())
+    }
+
+    /// The sizes of the windows of a row's pixels, as [`Engine::sizes`](crate::paper::Engine::sizes).
+    pub fn sizes<'s>(&self, scratch: &'s super::Scratch, y: usize) -> &'s [f32] {
+        &self.row(&scratch.paper, y).1[..self.points.width()]
     }
 
     /// A row's depths, and the radii of its windows.
