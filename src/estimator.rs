@@ -40,6 +40,10 @@ pub struct Maps<'a> {
     pub eigenvalues: Option<&'a mut [f32]>,
 }
 
+/// Where the windows of the pixels that take no even one have so many points, per pixel of the cloud, summing them one by one
+/// takes no longer than the pass over all pixels, with any method of PCL's.
+const FEW_LEFT: f32 = 0.5;
+
 /// Estimates the normals of organized point clouds. Owns its scratch memory, which is reused from frame to frame.
 #[derive(Debug)]
 pub struct Estimator {
@@ -310,13 +314,25 @@ impl Estimator {
         let is_along = options.is_cm_of_paper();
         let own = is_along.then_some((indices, normals));
         second_pass.compute(cloud, options, &mut FastEngine { job, scratch, own })?;
-        if options.semantics == Semantics::Pcl {
-            fast::compute(isa, points, options, indices, normals, scratch)?;
-        } else if !is_along {
-            fast::paper::compute_own(&job, second_pass.choices(), indices, normals, scratch)?;
+        let points_left = || second_pass.points_left(cloud.width, |y| job.sizes(scratch, y));
+        let has_own_pass = match options.semantics {
+            Semantics::Pcl => points_left() > FEW_LEFT * cloud.depths.len() as f32,
+            Semantics::Paper => !is_along,
+        };
+        if has_own_pass {
+            match options.semantics {
+                Semantics::Pcl => fast::compute(isa, points, options, indices, normals, scratch)?,
+                Semantics::Paper => fast::paper::compute_own(
+                    &job,
+                    second_pass.choices(),
+                    indices,
+                    normals,
+                    scratch,
+                )?,
+            }
         }
         let (scratch, workers, width) = (&*scratch, scratch.workers(), cloud.width);
-        let of_left = is_along.then_some(points);
+        let of_left = (!has_own_pass).then_some(points);
         if indices.is_none() {
             fast::paper::write_chosen(&job, second_pass, cloud, normals, of_left, scratch);
             return Ok(());

@@ -46,13 +46,7 @@ impl<'a> Plain<'a> {
     }
 
     pub fn estimate(&self, x: usize, y: usize) -> Estimate {
-        let side = self.window_side(x, y) as usize;
-        if side == 0 {
-            return Estimate::NONE;
-        }
-        let (points, image) = (self.points, &self.image);
-        let found = estimate_window(self.options.method, points, image, (x, y), (side, side));
-        turn_to_viewpoint(found, self.points.at(x, y), self.options.viewpoint)
+        of_side(self.points, self.options, (x, y), self.window_side(x, y) as usize)
     }
 
     /// The eigenvalues of the covariance matrices of all pixels' windows.
@@ -67,6 +61,22 @@ impl<'a> Plain<'a> {
         let sides = (0..width * height).map(|at| self.window_side(at % width, at / width));
         eigenvalue_map(self.points, sides.max().unwrap_or(0) as usize, window)
     }
+}
+
+/// The estimate of a pixel from the window of a side, turned to the viewpoint; none if that is 0.
+pub(crate) fn of_side(
+    points: &Points,
+    options: &Options,
+    pixel: (usize, usize),
+    side: usize,
+) -> Estimate {
+    if side == 0 {
+        return Estimate::NONE;
+    }
+    let (width, height) = (points.width(), points.height());
+    let image = Image { width, height, border_policy: options.border_policy };
+    let found = estimate_window(options.method, points, &image, pixel, (side, side));
+    turn_to_viewpoint(found, points.at(pixel.0, pixel.1), options.viewpoint)
 }
 
 /// What the second pass builds on.

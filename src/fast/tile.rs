@@ -15,9 +15,9 @@ use super::windows::Sides;
 use crate::Error;
 use crate::cloud::Points;
 use crate::depth_change::is_depth_change;
-use crate::methods::{Estimate, estimate_window, start};
+use crate::methods::{Estimate, start};
 use crate::options::Options;
-use crate::orientation::turn_to_viewpoint;
+use crate::plain::of_side;
 use crate::rect::Rect;
 use crate::simd::{GROUP, Groups, Simd};
 use crate::vector::dot;
@@ -429,10 +429,7 @@ impl Tile<'_> {
         for lane in Bits(lanes) {
             let pixel = (x + lane, y);
             let side = self.sides.row(y)[pixel.0] as usize;
-            let (points, image) = (self.points, self.image);
-            let found = estimate_window(self.options.method, points, image, pixel, (side, side));
-            let point = self.points.at(pixel.0, pixel.1);
-            estimates.put(lane, turn_to_viewpoint(found, point, self.options.viewpoint));
+            estimates.put(lane, of_side(self.points, self.options, pixel, side));
         }
     }
 

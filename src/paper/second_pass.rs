@@ -18,6 +18,7 @@ use crate::memory::{bytes, refill, resize};
 use crate::methods::Estimate;
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
+use crate::plain::of_side;
 use crate::threads::Workers;
 
 /// How windows and their estimates are computed: by the plain forms, or fast. Estimates are normals, not turned, and
@@ -177,8 +178,20 @@ impl SecondPass {
         Some(turn_to_viewpoint(found, cloud.points[at], options.viewpoint))
     }
 
-    /// The estimate, in the paper's semantics, of a pixel that could take an even window but takes none, where its row's pixels
-    /// have windows of these sizes.
+    /// How many points the windows of the pixels that take no even one have together; `sizes` are those of rows' windows.
+    pub fn points_left<'a>(&self, width: usize, sizes: impl Fn(usize) -> &'a [f32]) -> f32 {
+        let of_row = |(y, choices): (usize, &[u32])| {
+            let points = choices
+                .iter()
+                .zip(sizes(y))
+                .map(|(choice, side)| if *choice == NO_WINDOW { side * side } else { 0.0 });
+            points.sum::<f32>()
+        };
+        self.choices.chunks(width).enumerate().map(of_row).sum()
+    }
+
+    /// The estimate of a pixel that takes no even window, where its row's pixels have windows of these sizes; in the paper's
+    /// semantics, of one that could take one.
     pub fn left(
         &self,
         points: &Points,
@@ -186,9 +199,12 @@ impl SecondPass {
         (x, y): (usize, usize),
         sizes: &[f32],
     ) -> Option<Estimate> {
-        let choice = self.choices[y * points.width() + x];
-        let is_left = self.concerned.has((x, y)) && choice == NO_WINDOW;
-        is_left.then(|| of_radius(points, options, (x, y), sizes[x] as u32))
+        let is_left = self.choices[y * points.width() + x] == NO_WINDOW;
+        match options.semantics {
+            Semantics::Pcl => is_left.then(|| of_side(points, options, (x, y), sizes[x] as usize)),
+            Semantics::Paper => (is_left && self.concerned.has((x, y)))
+                .then(|| of_radius(points, options, (x, y), sizes[x] as u32)),
+        }
     }
 
     /// The estimate of a pixel that has a point but no normal, as `has_normal` says if no even window gave one: that of the

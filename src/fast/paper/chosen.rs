@@ -6,7 +6,7 @@ use crate::fast::arithmetic::Floats;
 use crate::fast::lanes::LANES;
 use crate::fast::paths::Task;
 use crate::fast::tile::{Bits, all, turned};
-use crate::options::Options;
+use crate::options::{Options, Semantics};
 use crate::paper::{Cloud, NO_WINDOW, SecondPass, marks_from};
 use crate::simd::{Along, Groups, load_by_fours};
 
@@ -17,8 +17,8 @@ pub(super) struct ChosenRow<'a> {
     pub second_pass: &'a SecondPass,
     pub normals: &'a Normals<'a>,
     pub y: usize,
-    /// The points and the sizes of the row's windows, if pixels that could take an even window but take none are to be written
-    /// too.
+    /// The points and the sizes of the row's windows, if pixels that take no even window are to be written too, those that
+    /// [`SecondPass::left`] has an estimate for.
     pub of_left: Option<(&'a Points<'a>, &'a [f32])>,
 }
 
@@ -53,15 +53,22 @@ impl ChosenRow<'_> {
                 let choices = S::load(choices.as_ptr().cast());
                 S::bits(S::eq(choices, choices))
             };
-            if of_left.is_some() {
-                let concerned = marks_from(concerned, x) as u32;
-                for lane in Bits(concerned & all(S::LANES) & !lanes) {
-                    self.write_one(x + lane);
-                }
-            }
-            if lanes != 0 {
+            let asked = match (of_left, options.semantics) {
+                (None, _) => lanes,
+                (_, Semantics::Pcl) => all(S::LANES),
+                (_, Semantics::Paper) => lanes | marks_from(concerned, x) as u32 & all(S::LANES),
+            };
+            if asked != 0 {
                 // SAFETY: as the caller's.
-                unsafe { self.write_chosen::<S>(x, choices, lanes) };
+                unsafe { self.write_chosen::<S>(x, choices, lanes, asked) };
+            }
+            // Mostly all take a window.
+            if let Some((_, sizes)) = of_left.filter(|_| asked != lanes) {
+                let sizes = &sizes[x..][..S::LANES];
+                // SAFETY: as the caller's; there are so many sizes.
+                let have_windows =
+                    unsafe { S::bits(S::lt(S::splat(0.0), S::load(sizes.as_ptr()))) };
+                Bits(asked & have_windows & !lanes).for_each(|lane| self.write_one(x + lane));
             }
             if options.one_sided_windows {
                 let depths = &cloud.depths[first + x..][..S::LANES];
@@ -81,12 +88,13 @@ impl ChosenRow<'_> {
         }
     }
 
-    /// Writes the normals of these lanes from column `x` on, which take the windows of these blocks.
+    /// Writes the normals of these lanes from column `x` on, which take the windows of these blocks, and none for the others
+    /// that are `asked` for.
     ///
     /// # Safety
     /// As [`ChosenRow::write`]; the lanes are in the row.
     #[inline(always)]
-    unsafe fn write_chosen<S: Along>(&self, x: usize, choices: &[u32], lanes: u32) {
+    unsafe fn write_chosen<S: Along>(&self, x: usize, choices: &[u32], lanes: u32, asked: u32) {
         let &ChosenRow { cloud, options, second_pass, normals, y, .. } = self;
         let of_even = second_pass.of_even();
         normals.prefetch((x, y), S::LANES, &(0..cloud.width));
@@ -101,22 +109,26 @@ impl ChosenRow<'_> {
             let normal = [Floats(nx), Floats(ny), Floats(nz)];
             let [nx, ny, nz] =
                 turned::<S>(normal, [Floats(px), Floats(py), Floats(pz)], options.viewpoint);
-            let fields = [nx.0, ny.0, nz.0, curvature];
-            if lanes.count_ones() as usize == S::LANES {
+            let mut fields = [nx.0, ny.0, nz.0, curvature];
+            if asked != lanes {
+                let (there, none) = (S::mask(lanes), S::splat(f32::NAN));
+                fields = fields.map(|field| S::select(there, field, none));
+            }
+            if asked.count_ones() as usize == S::LANES {
                 return normals.write_lanes::<S>(x, y, fields);
             }
             let mut found = [[0.0; LANES]; 4];
             for (to, field) in found.iter_mut().zip(fields) {
                 S::store(to.as_mut_ptr(), field);
             }
-            for lane in Bits(lanes) {
+            for lane in Bits(asked) {
                 let [nx, ny, nz, curvature] = found.each_ref().map(|field| field[lane]);
                 normals.write(x + lane, y, [nx, ny, nz], curvature);
             }
         }
     }
 
-    /// Writes the normal in a column, if it takes a window or could.
+    /// Writes the normal in a column, if it takes a window or is left.
     #[cold]
     fn write_one(&self, x: usize) {
         let &ChosenRow { cloud, options, second_pass, normals, y, of_left } = self;
