@@ -181,11 +181,8 @@ impl SecondPass {
     /// How many points the windows of the pixels that take no even one have together; `sizes` are those of rows' windows.
     pub fn points_left<'a>(&self, width: usize, sizes: impl Fn(usize) -> &'a [f32]) -> f32 {
         let of_row = |(y, choices): (usize, &[u32])| {
-            let points = choices
-                .iter()
-                .zip(sizes(y))
-                .map(|(choice, side)| if *choice == NO_WINDOW { side * side } else { 0.0 });
-            points.sum::<f32>()
+            let left = choices.iter().zip(sizes(y)).filter(|(choice, _)| **choice == NO_WINDOW);
+            left.map(|(_, side)| side * side).sum::<f32>()
         };
         self.choices.chunks(width).enumerate().map(of_row).sum()
     }
