@@ -246,9 +246,8 @@ fn compute_slices(
         let WorkerScratch { windows, sums, .. } = &mut *lock(scratch);
         windows.start(points, options, job.row(job.per_slice), expected)?;
         sums.frame = Frame::default();
-        if output.is_some() {
-            sums.reserve(&job, true, columns, side)?;
-        }
+        // Without an output too: after the second pass there may be one, or with the next frame.
+        sums.reserve(&job, true, columns, side)?;
     }
     let sink = output.map(|(indices, normals)| Sink::new(normals, indices, width, listed));
     let sink = sink.transpose()?;
