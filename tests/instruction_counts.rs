@@ -10,7 +10,7 @@
 //! with a far plane for "no return", as simulators write, with PCL's semantics three times as many; one in millimetres, whose
 //! windows are as large as depth changes and the image let them be, four times, or eight; and the paper's CM with a second
 //! pass for both one-sided and crease windows 2.3 times as many, or with zeros for "no return", as many sensors write them,
-//! 3.2 times.
+//! 3.2 times; PCL's 4 times.
 //!
 //! The program runs itself under valgrind: `frames N SEMANTICS METHOD POLICY METRES PLANE UNITS SECOND` computes N frames of
 //! a cloud that is moved to the right by so many metres, and then misses one x, with a plane at that depth in place of
@@ -100,11 +100,14 @@ fn main() -> ExitCode {
             let times = if (method, policy) == (Average3DGradient, Mirror) { 8 } else { 4 };
             check(count(Scene { units: 1000.0, ..usual }).0, times * bound, ", in millimetres");
         }
-        if (semantics, method) == (Paper, CovarianceMatrix) {
-            for (plane, tenths, what) in [(f32::NAN, 23, ""), (0.0, 32, " and zeros")] {
-                let (count, _) = count(Scene { second_pass: true, plane, ..usual });
-                check(count, bound * tenths / 10, &format!(", with a second pass{what}"));
-            }
+        let with_second_pass: &[_] = match (semantics, method, policy) {
+            (Paper, CovarianceMatrix, _) => &[(f32::NAN, 23, ""), (0.0, 32, " and zeros")],
+            (Pcl, CovarianceMatrix, Ignore) => &[(f32::NAN, 40, "")],
+            _ => &[],
+        };
+        for (plane, tenths, what) in with_second_pass {
+            let (count, _) = count(Scene { second_pass: true, plane: *plane, ..usual });
+            check(count, bound * tenths / 10, &format!(", with a second pass{what}"));
         }
         let (count, stages) = count(usual);
         check(count, bound, "");
