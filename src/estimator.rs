@@ -42,7 +42,7 @@ pub struct Maps<'a> {
 
 /// Where the windows of the pixels that take no even one have so many points, per pixel of the cloud, summing them one by one
 /// takes no longer than the pass over all pixels, with any method of PCL's.
-const FEW_LEFT: f32 = 0.5;
+const FEW_LEFT: f32 = 0.6;
 
 /// Estimates the normals of organized point clouds. Owns its scratch memory, which is reused from frame to frame.
 #[derive(Debug)]
