@@ -315,24 +315,20 @@ impl Estimator {
         let own = is_along.then_some((indices, normals));
         second_pass.compute(cloud, options, &mut FastEngine { job, scratch, own })?;
         let points_left = || second_pass.points_left(cloud.width, |y| job.sizes(scratch, y));
-        let has_own_pass = match options.semantics {
-            Semantics::Pcl => points_left() > FEW_LEFT * cloud.depths.len() as f32,
-            Semantics::Paper => !is_along,
-        };
-        if has_own_pass {
-            match options.semantics {
-                Semantics::Pcl => fast::compute(isa, points, options, indices, normals, scratch)?,
-                Semantics::Paper => fast::paper::compute_own(
-                    &job,
-                    second_pass.choices(),
-                    indices,
-                    normals,
-                    scratch,
-                )?,
+        let few = FEW_LEFT * cloud.depths.len() as f32;
+        let own_pass = match options.semantics {
+            Semantics::Pcl if points_left() > few => {
+                Some(fast::compute(isa, points, options, indices, normals, scratch))
             }
-        }
+            Semantics::Paper if !is_along => {
+                let choices = second_pass.choices();
+                Some(fast::paper::compute_own(&job, choices, indices, normals, scratch))
+            }
+            _ => None,
+        };
+        let own_pass = own_pass.transpose()?;
         let (scratch, workers, width) = (&*scratch, scratch.workers(), cloud.width);
-        let of_left = (!has_own_pass).then_some(points);
+        let of_left = own_pass.is_none().then_some(points);
         if indices.is_none() {
             fast::paper::write_chosen(&job, second_pass, cloud, normals, of_left, scratch);
             return Ok(());

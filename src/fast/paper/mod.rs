@@ -204,6 +204,7 @@ pub(crate) fn read_cloud(
     let rows = cloud.points.chunks_mut(BLOCK * width);
     let rows = rows.zip(cloud.depths.chunks_mut(BLOCK * width));
     let sums = cloud.sums.chunks_mut(across).chain(repeat_with(Default::default));
+    // As many rows at a time as a block has.
     let padded = std::iter::from_fn(|| {
         Some(std::array::from_fn::<_, BLOCK, _>(|_| padded.as_mut().and_then(Iterator::next)))
     });
@@ -763,6 +764,18 @@ mod tests {
                         all.into_iter().map(f32::to_bits).collect::<Vec<_>>()
                     };
                     assert_eq!(bits(&found), bits(&expected), "{isa:?} {width} x {height}");
+                    if summed {
+                        let depths = |scratch: &super::super::Scratch| {
+                            let Scratch { depths, ranges, .. } = &scratch.paper;
+                            let all =
+                                [&depths[..row_length(width) * height], ranges.as_flattened()];
+                            all.concat().into_iter().map(f32::to_bits).collect::<Vec<_>>()
+                        };
+                        let along = depths(&scratch);
+                        job.depths(&mut scratch).unwrap();
+                        assert_eq!(along, depths(&scratch), "{isa:?} {width} x {height}");
+                        scratch.paper = Scratch::default();
+                    }
                 }
             }
         }
