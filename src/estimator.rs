@@ -5,13 +5,12 @@ use crate::cloud::{Normals, Points};
 use crate::fast::paper::{FastEngine, Job};
 use crate::fast::{self, SIZES, Scratch};
 use crate::isa::Isa;
-use crate::methods::{Estimate, estimate_window};
+use crate::methods::Estimate;
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
-use crate::paper::{self, Cloud, PaperMaps, SecondPass};
-use crate::plain::{Plain, PlainEngine};
+use crate::paper::{Cloud, PaperMaps, SecondPass};
+use crate::plain::{Plain, PlainEngine, of_window};
 use crate::threads::Workers;
-use crate::window::Image;
 
 /// The maps behind the normals; each is written if it is there and must hold width x height elements, row by row,
 /// unless it says otherwise.
@@ -184,18 +183,13 @@ impl Estimator {
         }
         normal.check_disjoint(points)?;
         let size = (width as usize, height as usize);
-        let found = match self.options.semantics {
-            Semantics::Pcl => {
-                let (width, height) = (points.width(), points.height());
-                let cleaned = self.without_zeros(points)?;
-                let cleaned = cleaned.as_ref().map(packed);
-                let border_policy = self.options.border_policy;
-                let image = Image { width, height, border_policy };
-                let points = cleaned.as_ref().unwrap_or(points);
-                estimate_window(self.options.method, points, &image, (x, y), size)
-            }
-            Semantics::Paper => paper::estimate_window(points, &self.options, (x, y), size),
+        // The paper's methods leave zeros out themselves.
+        let cleaned = match self.options.semantics {
+            Semantics::Pcl => self.without_zeros(points)?,
+            Semantics::Paper => None,
         };
+        let cleaned = cleaned.as_ref().map(packed);
+        let found = of_window(cleaned.as_ref().unwrap_or(points), &self.options, (x, y), size);
         let found = turn_to_viewpoint(found, points.at(x, y), self.options.viewpoint);
         write(normal, None, 1, &Workers::default(), |_, _| Some(found));
         Ok(())
@@ -283,9 +277,8 @@ impl Estimator {
         let workers = scratch.workers();
         let mut engine = PlainEngine { points, options, workers, sizes: Vec::new() };
         second_pass.compute(cloud, options, &mut engine)?;
-        let own = engine.own()?;
         write(normals, indices, cloud.width, workers, |_, at| {
-            Some(second_pass.chosen(cloud, options, at).unwrap_or_else(|| own(at)))
+            Some(second_pass.chosen(cloud, options, at).unwrap_or_else(|| engine.own(at)))
         });
         write_around(cloud, options, second_pass, indices, normals, workers);
         Ok(())

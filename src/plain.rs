@@ -46,7 +46,7 @@ impl<'a> Plain<'a> {
     }
 
     pub fn estimate(&self, x: usize, y: usize) -> Estimate {
-        of_side(self.points, self.options, (x, y), self.window_side(x, y) as usize)
+        of_own_window(self.points, self.options, (x, y), self.window_side(x, y) as f32)
     }
 
     /// The eigenvalues of the covariance matrices of all pixels' windows.
@@ -63,19 +63,39 @@ impl<'a> Plain<'a> {
     }
 }
 
-/// The estimate of a pixel from the window of a side, turned to the viewpoint; none if that is 0.
-pub(crate) fn of_side(
+/// The estimate of a pixel from a window of any `size` around it, not turned.
+pub(crate) fn of_window(
     points: &Points,
     options: &Options,
     pixel: (usize, usize),
-    side: usize,
+    size: (usize, usize),
 ) -> Estimate {
-    if side == 0 {
+    match options.semantics {
+        Semantics::Pcl => {
+            let (width, height) = (points.width(), points.height());
+            let image = Image { width, height, border_policy: options.border_policy };
+            estimate_window(options.method, points, &image, pixel, size)
+        }
+        Semantics::Paper => paper::estimate_window(points, options, pixel, size),
+    }
+}
+
+/// The estimate of a pixel from its own window, of a size as [`Engine::sizes`](paper::Engine::sizes) has it, turned to the
+/// viewpoint.
+pub(crate) fn of_own_window(
+    points: &Points,
+    options: &Options,
+    pixel: (usize, usize),
+    size: f32,
+) -> Estimate {
+    if size == 0.0 {
         return Estimate::NONE;
     }
-    let (width, height) = (points.width(), points.height());
-    let image = Image { width, height, border_policy: options.border_policy };
-    let found = estimate_window(options.method, points, &image, pixel, (side, side));
+    let side = match options.semantics {
+        Semantics::Pcl => size as usize,
+        Semantics::Paper => 2 * size as usize + 1,
+    };
+    let found = of_window(points, options, pixel, (side, side));
     turn_to_viewpoint(found, points.at(pixel.0, pixel.1), options.viewpoint)
 }
 
@@ -89,17 +109,11 @@ pub(crate) struct PlainEngine<'a> {
 }
 
 impl PlainEngine<'_> {
-    /// The pixels' own estimates.
-    pub fn own(&self) -> Result<impl Fn(usize) -> Estimate + Sync, Error> {
-        let &PlainEngine { points, options, ref sizes, .. } = self;
-        let width = points.width();
-        let is_pcl = options.semantics == Semantics::Pcl;
-        let of_pcl = is_pcl.then(|| Plain::new(points, options)).transpose()?;
-        Ok(move |at: usize| {
-            let (x, y) = (at % width, at / width);
-            let of_paper = || paper::of_radius(points, options, (x, y), sizes[at] as u32);
-            of_pcl.as_ref().map_or_else(of_paper, |plain| plain.estimate(x, y))
-        })
+    /// A pixel's own estimate.
+    pub fn own(&self, at: usize) -> Estimate {
+        let PlainEngine { points, options, sizes, .. } = self;
+        let pixel = (at % points.width(), at / points.width());
+        of_own_window(points, options, pixel, sizes[at])
     }
 }
 

@@ -17,7 +17,7 @@ use crate::cloud::Points;
 use crate::depth_change::is_depth_change;
 use crate::methods::{Estimate, start};
 use crate::options::Options;
-use crate::plain::of_side;
+use crate::plain::of_own_window;
 use crate::rect::Rect;
 use crate::simd::{GROUP, Groups, Simd};
 use crate::vector::dot;
@@ -428,8 +428,8 @@ impl Tile<'_> {
     fn plain_lanes(&self, estimates: &mut Estimates, (x, y): (usize, usize), lanes: u32) {
         for lane in Bits(lanes) {
             let pixel = (x + lane, y);
-            let side = self.sides.row(y)[pixel.0] as usize;
-            estimates.put(lane, of_side(self.points, self.options, pixel, side));
+            let side = self.sides.row(y)[pixel.0];
+            estimates.put(lane, of_own_window(self.points, self.options, pixel, side));
         }
     }
 

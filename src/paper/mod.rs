@@ -47,7 +47,6 @@ use crate::eigenvalues::eigenvalue_map;
 use crate::memory::table;
 use crate::methods::Estimate;
 use crate::options::{Options, Semantics};
-use crate::orientation::turn_to_viewpoint;
 use crate::rect::Rect;
 use crate::threads::Workers;
 
@@ -150,20 +149,4 @@ fn rect_around(pixel: (usize, usize), size: (usize, usize), image: (usize, usize
         at.saturating_sub(size / 2)..(at + size).saturating_sub(size / 2).min(limit)
     };
     Rect { x: range(pixel.0, size.0, image.0), y: range(pixel.1, size.1, image.1) }
-}
-
-/// The plain form's estimate of a pixel from the window of a radius, turned to the viewpoint; none if that is 0.
-pub(crate) fn of_radius(
-    points: &Points,
-    options: &Options,
-    pixel: (usize, usize),
-    radius: u32,
-) -> Estimate {
-    if radius == 0 {
-        return Estimate::NONE;
-    }
-    let cleaned = Cleaned::new(points, options);
-    let rect = window(pixel, radius as usize, points.width(), points.height());
-    let found = methods::estimate(options.method, &cleaned, &rect);
-    turn_to_viewpoint(found, points.at(pixel.0, pixel.1), options.viewpoint)
 }

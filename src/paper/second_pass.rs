@@ -9,16 +9,16 @@ use super::choices::{EvenWindows, NO_WINDOW};
 use super::cloud::Cloud;
 use super::depth_change::DepthChanges;
 use super::even_windows::{Asked, EvenWindow};
-use super::marks::{Marks, WORD, word_of};
+use super::marks::{Marks, WORD, from, word_of};
 use super::noise::{FARTHEST, noise_area};
-use super::{is_depth_change, of_radius, smoothing_area, surroundings};
+use super::{is_depth_change, smoothing_area, surroundings};
 use crate::Error;
 use crate::cloud::Points;
 use crate::memory::{bytes, refill, resize};
 use crate::methods::Estimate;
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
-use crate::plain::of_side;
+use crate::plain::of_own_window;
 use crate::threads::Workers;
 
 /// How windows and their estimates are computed: by the plain forms, or fast. Estimates are normals, not turned, and
@@ -161,11 +161,6 @@ impl SecondPass {
         &self.choices
     }
 
-    /// The pixels that could take an even window.
-    pub fn concerned(&self) -> &Marks {
-        &self.concerned
-    }
-
     /// The estimates of the even windows, block by block.
     pub fn of_even(&self) -> &[[f32; 4]] {
         &self.windows.of_even
@@ -196,11 +191,18 @@ impl SecondPass {
         (x, y): (usize, usize),
         sizes: &[f32],
     ) -> Option<Estimate> {
-        let is_left = self.choices[y * points.width() + x] == NO_WINDOW;
+        let takes_none = self.choices[y * points.width() + x] == NO_WINDOW;
+        let is_left = takes_none && self.may_be_left(options, (x, y)) & 1 != 0;
+        is_left.then(|| of_own_window(points, options, (x, y), sizes[x]))
+    }
+
+    /// The marks, from a pixel to the end of the word, of those that are left if they take no even window: in the paper's
+    /// semantics the others are written along with the even windows.
+    #[inline(always)]
+    pub fn may_be_left(&self, options: &Options, (x, y): (usize, usize)) -> u64 {
         match options.semantics {
-            Semantics::Pcl => is_left.then(|| of_side(points, options, (x, y), sizes[x] as usize)),
-            Semantics::Paper => (is_left && self.concerned.has((x, y)))
-                .then(|| of_radius(points, options, (x, y), sizes[x] as u32)),
+            Semantics::Pcl => u64::MAX,
+            Semantics::Paper => from(self.concerned.row(y), x),
         }
     }
 

@@ -6,8 +6,8 @@ use crate::fast::arithmetic::Floats;
 use crate::fast::lanes::LANES;
 use crate::fast::paths::Task;
 use crate::fast::tile::{Bits, all, turned};
-use crate::options::{Options, Semantics};
-use crate::paper::{Cloud, NO_WINDOW, SecondPass, marks_from};
+use crate::options::Options;
+use crate::paper::{Cloud, NO_WINDOW, SecondPass};
 use crate::simd::{Along, Groups, load_by_fours};
 
 /// A row of pixels, some of which take even windows.
@@ -42,7 +42,6 @@ impl ChosenRow<'_> {
         let &ChosenRow { cloud, options, second_pass, y, of_left, .. } = self;
         let first = y * cloud.width;
         let choices = &second_pass.choices()[first..][..cloud.width];
-        let concerned = second_pass.concerned().row(y);
         const { assert!(f32::from_bits(NO_WINDOW).is_nan()) };
         let whole = cloud.width / S::LANES * S::LANES;
         for x in (0..whole).step_by(S::LANES) {
@@ -53,11 +52,8 @@ impl ChosenRow<'_> {
                 let choices = S::load(choices.as_ptr().cast());
                 S::bits(S::eq(choices, choices))
             };
-            let asked = match (of_left, options.semantics) {
-                (None, _) => lanes,
-                (_, Semantics::Pcl) => all(S::LANES),
-                (_, Semantics::Paper) => lanes | marks_from(concerned, x) as u32 & all(S::LANES),
-            };
+            let may_be_left = || second_pass.may_be_left(options, (x, y)) as u32 & all(S::LANES);
+            let asked = if of_left.is_some() { lanes | may_be_left() } else { lanes };
             if asked != 0 {
                 // SAFETY: as the caller's.
                 unsafe { self.write_chosen::<S>(x, choices, lanes, asked) };
