@@ -39,10 +39,6 @@ pub struct Maps<'a> {
     pub eigenvalues: Option<&'a mut [f32]>,
 }
 
-/// Where the windows of the pixels that take no even one have so many points, per pixel of the cloud, summing them one by one
-/// takes no longer than the pass over all pixels, with any method of PCL's.
-const FEW_LEFT: f32 = 0.6;
-
 /// Estimates the normals of organized point clouds. Owns its scratch memory, which is reused from frame to frame.
 #[derive(Debug)]
 pub struct Estimator {
@@ -278,7 +274,8 @@ impl Estimator {
         let mut engine = PlainEngine { points, options, workers, sizes: Vec::new() };
         second_pass.compute(cloud, options, &mut engine)?;
         write(normals, indices, cloud.width, workers, |_, at| {
-            Some(second_pass.chosen(cloud, options, at).unwrap_or_else(|| engine.own(at)))
+            let chosen = second_pass.chosen(cloud, options, at, engine.sizes[at]);
+            Some(chosen.unwrap_or_else(|| engine.own(at)))
         });
         write_around(cloud, options, second_pass, indices, normals, workers);
         Ok(())
@@ -307,31 +304,30 @@ impl Estimator {
         let is_along = options.is_cm_of_paper();
         let own = is_along.then_some((indices, normals));
         second_pass.compute(cloud, options, &mut FastEngine { job, scratch, own })?;
-        let points_left = || second_pass.points_left(cloud.width, |y| job.sizes(scratch, y));
-        let few = FEW_LEFT * cloud.depths.len() as f32;
-        let own_pass = match options.semantics {
-            Semantics::Pcl if points_left() > few => {
-                Some(fast::compute(isa, points, options, indices, normals, scratch))
+        if !is_along {
+            fast::paper::find_left(&job, second_pass.choices(), scratch)?;
+            match options.semantics {
+                Semantics::Pcl => {
+                    fast::compute_left((isa, points, options), indices, normals, scratch)?;
+                }
+                Semantics::Paper => {
+                    fast::paper::compute_left(&job, indices, normals, scratch)?;
+                }
             }
-            Semantics::Paper if !is_along => {
-                let choices = second_pass.choices();
-                Some(fast::paper::compute_own(&job, choices, indices, normals, scratch))
-            }
-            _ => None,
-        };
-        let own_pass = own_pass.transpose()?;
+        }
+        // Of the others only a few are left.
+        let of_left = is_along.then_some(points);
         let (scratch, workers, width) = (&*scratch, scratch.workers(), cloud.width);
-        let of_left = own_pass.is_none().then_some(points);
         if indices.is_none() {
             fast::paper::write_chosen(&job, second_pass, cloud, normals, of_left, scratch);
             return Ok(());
         }
-        let chosen = |at| second_pass.chosen(cloud, options, at);
-        let left = |at| {
+        write(normals, indices, width, workers, |_, at| {
             let pixel = (at % width, at / width);
-            second_pass.left(of_left?, options, pixel, job.sizes(scratch, pixel.1))
-        };
-        write(normals, indices, width, workers, |_, at| chosen(at).or_else(|| left(at)));
+            let size = job.sizes(scratch, pixel.1)[pixel.0];
+            let chosen = second_pass.chosen(cloud, options, at, size);
+            chosen.or_else(|| second_pass.left(of_left?, options, pixel, size))
+        });
         write_around(cloud, options, second_pass, indices, normals, workers);
         Ok(())
     }

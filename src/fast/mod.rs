@@ -25,6 +25,7 @@ mod sink;
 mod strip_pairs;
 mod strips;
 mod tile;
+mod tiling;
 mod windows;
 
 use std::ops::{Range, RangeInclusive};
@@ -42,6 +43,7 @@ use sink::Sink;
 use strip_pairs::StripPairs;
 use strips::Strips;
 use tile::{Sums, Tile};
+use tiling::{Tiling, part};
 use windows::{Sides, Windows, reach};
 
 use crate::Error;
@@ -49,6 +51,7 @@ use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::memory::bytes;
 use crate::options::{Method, Options};
+use crate::paper::Marks;
 use crate::simd::{GROUP, Groups};
 use crate::threads::Workers;
 use crate::window::Image;
@@ -179,9 +182,8 @@ struct Job<'a> {
     image: Image,
     /// How far points are apart, for [`scale_to_integers`].
     spacing: f32,
-    /// Strips of the image, and of a slice.
+    /// Strips of the image.
     strips: usize,
-    per_slice: usize,
 }
 
 /// The normals of the pixels that `indices` list, or of all.
@@ -195,6 +197,41 @@ pub(crate) fn compute(
 ) -> Result<(), Error> {
     let output = Some((indices, normals));
     compute_slices(isa, points, options, output, |_, _| (), scratch)
+}
+
+/// As [`compute`], of the pixels that the second pass leaves to their own windows, the sides of which [`sides`] has found;
+/// the others are not written. The job's depths have been read.
+pub(crate) fn compute_left(
+    (isa, points, options): (Isa, &Points, &Options),
+    indices: Option<&[i32]>,
+    normals: &Normals,
+    scratch: &mut Scratch,
+) -> Result<(), Error> {
+    let Scratch { workers, each, listed, paper, .. } = scratch;
+    let (width, height) = (points.width(), points.height());
+    let job = Job::new(isa, points, options);
+    let sink = Sink::new(normals, indices, width, listed)?;
+    let (left, sides) = (&paper.left, paper.sides(width));
+    let row = |y: usize| sides.row(y);
+    let tiling = Tiling::new((width, height), (width, height.div_ceil(job.strips)));
+    let tiling = tiling.or_cells(left, row, |side| side as usize / 2 + 1);
+    let done = workers.try_share(tiling.tiles(), |worker, tiles| {
+        let sums = &mut lock(&each[worker]).sums;
+        sums.frame = Frame::default();
+        let parts = tiles.filter_map(|tile| part(tile, left, row));
+        for ((columns, rows), side) in parts {
+            let side = side as usize;
+            let reach = side + 2;
+            let around = rows.start.saturating_sub(reach)..(rows.end + reach).min(height);
+            let strip = Strip { columns, rows, side, reach, depths: paper.depths_of(around) };
+            job.strip(strip, (sides, Some(left)), sums, &sink)?;
+        }
+        Ok(())
+    });
+    if done.is_err() {
+        write_none(normals);
+    }
+    done
 }
 
 /// The sides of all pixels' windows, 0 for none, in place of the paper's radii.
@@ -226,25 +263,17 @@ fn compute_slices(
     scratch.prepare(options.threads)?;
     let Scratch { workers, each, listed, last_reach, .. } = scratch;
     let (width, height) = (points.width(), points.height());
-    let strips = strips(width, height);
     let least_reach = reach(points, options, 0.0);
     let expected = least_reach.max(*last_reach);
-    let is_depth = options.method == Method::AverageDepthChange;
-    let job = Job {
-        isa,
-        points,
-        options,
-        image: Image { width, height, border_policy: options.border_policy },
-        spacing: if is_depth { spacing(points) } else { 0.0 },
-        strips,
-        per_slice: (SLICE_REACHES * expected).div_ceil(height / strips).min(strips),
-    };
+    let job = Job::new(isa, points, options);
+    let strips = job.strips;
+    let per_slice = (SLICE_REACHES * expected).div_ceil(height / strips).min(strips);
     // Nothing is written if there is no memory for what is known already.
     let columns = job.columns(true, least_reach);
     let side = Frame::most_of_ring(least_reach - 2).min(width + height);
     for scratch in &each[..workers.count()] {
         let WorkerScratch { windows, sums, .. } = &mut *lock(scratch);
-        windows.start(points, options, job.row(job.per_slice), expected)?;
+        windows.start(points, options, job.row(per_slice), expected)?;
         sums.frame = Frame::default();
         // Without an output too: after the second pass there may be one, or with the next frame.
         sums.reserve(&job, true, columns, side)?;
@@ -252,12 +281,12 @@ fn compute_slices(
     let sink = output.map(|(indices, normals)| Sink::new(normals, indices, width, listed));
     let sink = sink.transpose()?;
     let reach = AtomicUsize::new(0);
-    let chunks = chunks(strips, job.per_slice, workers.count());
+    let chunks = chunks(strips, per_slice, workers.count());
     let done = workers.try_share(chunks, |worker, chunks| {
         let WorkerScratch { windows, sums, .. } = &mut *lock(&each[worker]);
         for chunk in chunks {
-            for first in chunk.clone().step_by(job.per_slice) {
-                let slice = first..(first + job.per_slice).min(chunk.end);
+            for first in chunk.clone().step_by(per_slice) {
+                let slice = first..(first + per_slice).min(chunk.end);
                 let rows = job.row(slice.start)..job.row(slice.end);
                 job.sweep(windows, rows.clone())?;
                 read(rows, windows.sides(width));
@@ -325,7 +354,26 @@ impl<T> Parts<T> {
     }
 }
 
-impl Job<'_> {
+/// Rows of the image, or some columns of them, that are computed together.
+struct Strip {
+    columns: Range<usize>,
+    rows: Range<usize>,
+    /// The largest of their windows, and how far these may reach from their pixels.
+    side: usize,
+    reach: usize,
+    /// The least and the largest magnitude of depth of what is in reach.
+    depths: [f32; 2],
+}
+
+impl<'a> Job<'a> {
+    fn new(isa: Isa, points: &'a Points, options: &'a Options) -> Self {
+        let (width, height) = (points.width(), points.height());
+        let image = Image { width, height, border_policy: options.border_policy };
+        let is_depth = options.method == Method::AverageDepthChange;
+        let spacing = if is_depth { spacing(points) } else { 0.0 };
+        Job { isa, points, options, image, spacing, strips: strips(width, height) }
+    }
+
     /// Where a strip starts: strips are of like heights.
     fn row(&self, strip: usize) -> usize {
         let (rows, rest) = (self.image.height / self.strips, self.image.height % self.strips);
@@ -354,23 +402,39 @@ impl Job<'_> {
         let reach = reach(points, options, own.deepest());
         let around = rows.start.saturating_sub(reach)..(rows.end + reach).min(height);
         let around = windows.swept(around);
-        let side = own.side as usize;
+        let depths = [around.nearest(), around.deepest()];
+        let strip = Strip { columns: 0..width, rows, side: own.side as usize, reach, depths };
+        self.strip(strip, (windows.sides(width), None), scratch, sink)?;
+        Ok(reach)
+    }
+
+    /// The tiles of a strip, of all its pixels or of those that are marked, whose windows have these sides.
+    fn strip(
+        &self,
+        strip: Strip,
+        (sides, left): (Sides, Option<&Marks>),
+        scratch: &mut TileScratch,
+        sink: &Sink,
+    ) -> Result<(), Error> {
+        let &Job { points, options, .. } = self;
+        let Strip { columns: Range { start, end }, rows, side, reach, depths } = strip;
         let is_depth = options.method == Method::AverageDepthChange;
-        let scale = || scale_to_integers(self.spacing, options, around.deepest(), side);
+        let scale = || scale_to_integers(self.spacing, options, depths[1], side);
         let scale = is_depth.then(scale).flatten();
         let columns = self.columns(scale.is_some(), reach);
+        let columns = columns.min((end - start).next_multiple_of(GROUP));
         scratch.reserve(self, scale.is_some(), columns, side)?;
-        let depths = [around.nearest(), around.deepest()];
         let (layers, count) = layers(depths, self.span(scale.is_some()), side, options);
-        for column in (0..width).step_by(columns) {
+        for column in (start..end).step_by(columns) {
             let tile = &Tile {
                 points,
                 options,
                 image: &self.image,
-                columns: column..(column + columns).min(width),
+                columns: column..(column + columns).min(end),
                 rows: rows.clone(),
                 layers: &layers[..count],
-                sides: windows.sides(width),
+                sides,
+                left,
             };
             let TileScratch { frame, planes, moments, strip_pairs, strips, .. } = scratch;
             let TileScratch { half_windows, integer_half_windows, .. } = scratch;
@@ -386,7 +450,7 @@ impl Job<'_> {
                 (Method::Simple3DGradient, _) => self.tile(tile, frame, planes, strips, sink),
             }
         }
-        Ok(reach)
+        Ok(())
     }
 
     /// The normals of one tile.

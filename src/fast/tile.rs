@@ -17,6 +17,7 @@ use crate::cloud::Points;
 use crate::depth_change::is_depth_change;
 use crate::methods::{Estimate, start};
 use crate::options::Options;
+use crate::paper::Marks;
 use crate::plain::of_own_window;
 use crate::rect::Rect;
 use crate::simd::{GROUP, Groups, Simd};
@@ -204,6 +205,8 @@ pub(crate) struct Tile<'a> {
     /// Those that the tile's pixels are in.
     pub layers: &'a [Layer],
     pub sides: Sides<'a>,
+    /// The pixels whose normals are written; none where all are.
+    pub left: Option<&'a Marks>,
 }
 
 /// How the rows of a layer of a tile are gone through.
@@ -233,7 +236,7 @@ impl Tile<'_> {
         sums: &mut M,
         sink: &Sink,
     ) {
-        if self.layers.len() > 1 {
+        if self.layers.len() > 1 && self.left.is_none() {
             // SAFETY: as the caller's. One layer of several writes its own pixels only.
             unsafe { self.write_none::<S>(sink) };
         }
@@ -243,7 +246,7 @@ impl Tile<'_> {
         let can_go_on = M::EXACT && self.layers.len() == 1;
         for layer in self.layers {
             let Some(origin) = self.origin(layer) else {
-                if layer.is_all() {
+                if layer.is_all() && self.left.is_none() {
                     // SAFETY: as the caller's.
                     unsafe { self.write_none::<S>(sink) };
                 }
@@ -398,10 +401,13 @@ impl Tile<'_> {
         None
     }
 
-    /// Those of some lanes from pixel `(x, y)` on that are a layer's.
+    /// Those of some lanes from pixel `(x, y)` on that are a layer's, and are left if only some are.
     #[cold]
     fn of_layer(&self, layer: &Layer, (x, y): (usize, usize), lanes: u32) -> u32 {
-        Bits(lanes).which(|lane| layer.has(self.points.z(x + lane, y)))
+        Bits(lanes).which(|lane| {
+            let x = x + lane;
+            self.left.is_none_or(|left| left.has((x, y))) && layer.has(self.points.z(x, y))
+        })
     }
 
     /// What a pixel's window and the pixels around it cover.
@@ -510,7 +516,7 @@ impl<M: Sums> Row<'_, M> {
                 unsafe {
                     let mut pair = Pair::new::<S>(tile, row, x, y, inner);
                     let mut written = all((tile.columns.end - x).min(LANES));
-                    if !layer.is_all() {
+                    if !layer.is_all() || tile.left.is_some() {
                         pair.windows = tile.of_layer(layer, (x, y), pair.windows);
                         written = pair.windows;
                     }

@@ -164,7 +164,7 @@ impl Windows {
 
     /// The sides of the slice's windows.
     pub fn sides(&self, width: usize) -> Sides<'_> {
-        Sides { rows: &self.map, width, first: self.first }
+        Sides { rows: floats(&self.map), length: LANES * row_length(width), first: self.first }
     }
 
     /// Bytes held.
@@ -176,17 +176,18 @@ impl Windows {
 /// The sides of the windows of a slice's pixels, 0 for none.
 #[derive(Clone, Copy)]
 pub(crate) struct Sides<'a> {
-    rows: &'a [Lanes],
-    width: usize,
+    pub rows: &'a [f32],
+    /// From a row to the next: the width rounded up to a multiple of 16, at least.
+    pub length: usize,
     /// The image's row that is the first of these.
-    first: usize,
+    pub first: usize,
 }
 
 impl<'a> Sides<'a> {
-    /// Those of the image's row `y`, and more that means nothing: the width rounded up to a multiple of 16, at least.
+    /// Those of the image's row `y`, and more that means nothing.
+    #[inline(always)]
     pub fn row(&self, y: usize) -> &'a [f32] {
-        let length = row_length(self.width);
-        floats(&self.rows[(y - self.first) * length..][..length])
+        &self.rows[(y - self.first) * self.length..][..self.length]
     }
 }
 

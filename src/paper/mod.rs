@@ -32,7 +32,7 @@ pub(crate) use even_windows::{
     Asked, CHANCE, EvenWindow, JAGGED, JAGGED_LINES, JAGGED_POINTS, JAGGED_RADIUS, RELIEF,
     RELIEF_RADIUS, estimate_of, even_window,
 };
-pub(crate) use marks::{Marks, WORD, from as marks_from, mark, word_of};
+pub(crate) use marks::{Marks, WORD, columns as columns_of, from as marks_from, mark, word_of};
 pub(crate) use methods::estimate as plain_estimate;
 pub(crate) use planes::{JITTER, Plane, estimate_in_space, inverse_depth};
 pub(crate) use second_pass::{Engine, SecondPass, Windows};

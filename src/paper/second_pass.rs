@@ -166,44 +166,40 @@ impl SecondPass {
         &self.windows.of_even
     }
 
-    /// The estimate of a pixel, turned to the viewpoint, that takes an even window.
-    pub fn chosen(&self, cloud: &Cloud, options: &Options, at: usize) -> Option<Estimate> {
-        let choice = Some(self.choices[at]).filter(|choice| *choice != NO_WINDOW)?;
+    /// The estimate of a pixel, turned to the viewpoint, if it takes an even window, or none as it has no window at all: its own
+    /// is of this size.
+    pub fn chosen(
+        &self,
+        cloud: &Cloud,
+        options: &Options,
+        at: usize,
+        size: f32,
+    ) -> Option<Estimate> {
+        let choice = self.choices[at];
+        if choice == NO_WINDOW {
+            return (size == 0.0).then_some(Estimate::NONE);
+        }
         let found = self.windows.of_even[choice as usize].into();
         Some(turn_to_viewpoint(found, cloud.points[at], options.viewpoint))
     }
 
-    /// How many points the windows of the pixels that take no even one have together; `sizes` are those of rows' windows.
-    pub fn points_left<'a>(&self, width: usize, sizes: impl Fn(usize) -> &'a [f32]) -> f32 {
-        let of_row = |(y, choices): (usize, &[u32])| {
-            let left = choices.iter().zip(sizes(y)).filter(|(choice, _)| **choice == NO_WINDOW);
-            left.map(|(_, side)| side * side).sum::<f32>()
-        };
-        self.choices.chunks(width).enumerate().map(of_row).sum()
-    }
-
-    /// The estimate of a pixel that takes no even window, where its row's pixels have windows of these sizes; in the paper's
-    /// semantics, of one that could take one.
+    /// The estimate of a pixel that takes no even window, but could: from its own, which is of this size.
     pub fn left(
         &self,
         points: &Points,
         options: &Options,
-        (x, y): (usize, usize),
-        sizes: &[f32],
+        pixel: (usize, usize),
+        size: f32,
     ) -> Option<Estimate> {
-        let takes_none = self.choices[y * points.width() + x] == NO_WINDOW;
-        let is_left = takes_none && self.may_be_left(options, (x, y)) & 1 != 0;
-        is_left.then(|| of_own_window(points, options, (x, y), sizes[x]))
+        let may_be_chosen = self.may_be_chosen(options, pixel) & 1 != 0;
+        may_be_chosen.then(|| of_own_window(points, options, pixel, size))
     }
 
-    /// The marks, from a pixel to the end of the word, of those that are left if they take no even window: in the paper's
-    /// semantics the others are written along with the even windows.
+    /// The marks, from a pixel to the end of the word, of those that could take an even window: with CM in the paper's semantics
+    /// the others are written along with the even windows.
     #[inline(always)]
-    pub fn may_be_left(&self, options: &Options, (x, y): (usize, usize)) -> u64 {
-        match options.semantics {
-            Semantics::Pcl => u64::MAX,
-            Semantics::Paper => from(self.concerned.row(y), x),
-        }
+    pub fn may_be_chosen(&self, options: &Options, (x, y): (usize, usize)) -> u64 {
+        if options.is_cm_of_paper() { from(self.concerned.row(y), x) } else { u64::MAX }
     }
 
     /// The estimate of a pixel that has a point but no normal, as `has_normal` says if no even window gave one: that of the

@@ -17,9 +17,10 @@ pub(super) struct ChosenRow<'a> {
     pub second_pass: &'a SecondPass,
     pub normals: &'a Normals<'a>,
     pub y: usize,
-    /// The points and the sizes of the row's windows, if pixels that take no even window are to be written too, those that
-    /// [`SecondPass::left`] has an estimate for.
-    pub of_left: Option<(&'a Points<'a>, &'a [f32])>,
+    /// Those of the windows of the row's pixels.
+    pub sizes: &'a [f32],
+    /// The points, if pixels that are left to their own windows are written too.
+    pub of_left: Option<&'a Points<'a>>,
 }
 
 /// Writes them; the others stay as they are, but with one-sided windows those without a normal get one from the points
@@ -39,7 +40,7 @@ impl ChosenRow<'_> {
     /// As the task's.
     #[inline(always)]
     unsafe fn write<S: Along>(&self) {
-        let &ChosenRow { cloud, options, second_pass, y, of_left, .. } = self;
+        let &ChosenRow { cloud, options, second_pass, y, sizes, of_left, .. } = self;
         let first = y * cloud.width;
         let choices = &second_pass.choices()[first..][..cloud.width];
         const { assert!(f32::from_bits(NO_WINDOW).is_nan()) };
@@ -52,19 +53,24 @@ impl ChosenRow<'_> {
                 let choices = S::load(choices.as_ptr().cast());
                 S::bits(S::eq(choices, choices))
             };
-            let may_be_left = || second_pass.may_be_left(options, (x, y)) as u32 & all(S::LANES);
-            let asked = if of_left.is_some() { lanes | may_be_left() } else { lanes };
-            if asked != 0 {
-                // SAFETY: as the caller's.
-                unsafe { self.write_chosen::<S>(x, choices, lanes, asked) };
-            }
+            let (mut without, mut left) = (0, 0);
             // Mostly all take a window.
-            if let Some((_, sizes)) = of_left.filter(|_| asked != lanes) {
+            if lanes != all(S::LANES) {
+                let others = second_pass.may_be_chosen(options, (x, y)) as u32;
+                let others = others & all(S::LANES) & !lanes;
                 let sizes = &sizes[x..][..S::LANES];
                 // SAFETY: as the caller's; there are so many sizes.
-                let have_windows =
-                    unsafe { S::bits(S::lt(S::splat(0.0), S::load(sizes.as_ptr()))) };
-                Bits(asked & have_windows & !lanes).for_each(|lane| self.write_one(x + lane));
+                without =
+                    unsafe { S::bits(S::eq(S::splat(0.0), S::load(sizes.as_ptr()))) } & others;
+                left = others & !without;
+            }
+            let written = lanes | without;
+            if written != 0 {
+                // SAFETY: as the caller's.
+                unsafe { self.write_chosen::<S>(x, choices, lanes, written) };
+            }
+            if of_left.is_some() {
+                Bits(left).for_each(|lane| self.write_one(x + lane));
             }
             if options.one_sided_windows {
                 let depths = &cloud.depths[first + x..][..S::LANES];
@@ -85,12 +91,12 @@ impl ChosenRow<'_> {
     }
 
     /// Writes the normals of these lanes from column `x` on, which take the windows of these blocks, and none for the others
-    /// that are `asked` for.
+    /// that are `written`.
     ///
     /// # Safety
     /// As [`ChosenRow::write`]; the lanes are in the row.
     #[inline(always)]
-    unsafe fn write_chosen<S: Along>(&self, x: usize, choices: &[u32], lanes: u32, asked: u32) {
+    unsafe fn write_chosen<S: Along>(&self, x: usize, choices: &[u32], lanes: u32, written: u32) {
         let &ChosenRow { cloud, options, second_pass, normals, y, .. } = self;
         let of_even = second_pass.of_even();
         normals.prefetch((x, y), S::LANES, &(0..cloud.width));
@@ -106,34 +112,31 @@ impl ChosenRow<'_> {
             let [nx, ny, nz] =
                 turned::<S>(normal, [Floats(px), Floats(py), Floats(pz)], options.viewpoint);
             let mut fields = [nx.0, ny.0, nz.0, curvature];
-            if asked != lanes {
+            if written != lanes {
                 let (there, none) = (S::mask(lanes), S::splat(f32::NAN));
                 fields = fields.map(|field| S::select(there, field, none));
             }
-            if asked.count_ones() as usize == S::LANES {
+            if written.count_ones() as usize == S::LANES {
                 return normals.write_lanes::<S>(x, y, fields);
             }
             let mut found = [[0.0; LANES]; 4];
             for (to, field) in found.iter_mut().zip(fields) {
                 S::store(to.as_mut_ptr(), field);
             }
-            for lane in Bits(asked) {
+            for lane in Bits(written) {
                 let [nx, ny, nz, curvature] = found.each_ref().map(|field| field[lane]);
                 normals.write(x + lane, y, [nx, ny, nz], curvature);
             }
         }
     }
 
-    /// Writes the normal in a column, if it takes a window or is left.
+    /// Writes the normal in a column, if it takes a window, has none or is left.
     #[cold]
     fn write_one(&self, x: usize) {
-        let &ChosenRow { cloud, options, second_pass, normals, y, of_left } = self;
-        let at = y * cloud.width + x;
-        let left = || {
-            let (points, sizes) = of_left?;
-            second_pass.left(points, options, (x, y), sizes)
-        };
-        if let Some(found) = second_pass.chosen(cloud, options, at).or_else(left) {
+        let &ChosenRow { cloud, options, second_pass, normals, y, sizes, of_left } = self;
+        let (at, size) = (y * cloud.width + x, sizes[x]);
+        let left = || second_pass.left(of_left?, options, (x, y), size);
+        if let Some(found) = second_pass.chosen(cloud, options, at, size).or_else(left) {
             // SAFETY: as the caller's of `write`.
             unsafe { normals.write(x, y, found.normal, found.curvature) };
         }

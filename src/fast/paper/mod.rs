@@ -29,12 +29,14 @@ use even_windows::{Even, EvenTile};
 use integrals::{Rings, elements_of_rings, presence_of_rings, reached, rows_of_rings};
 use layers::{Layer, Waiting};
 use methods::{CovarianceMatrix, Gradients, MOMENTS, SmoothedDepthChanges, Sums};
-use tile::Tile;
+use tile::{Tile, Written};
 use windows::{Rows, Sweep, reach};
 
 use super::buffer::Buffer;
 use super::paths::{self, Task};
 use super::sink::Sink;
+use super::tiling::{Tiling, part};
+use super::windows::Sides;
 use super::{Parts, lock};
 use crate::Error;
 use crate::cloud::{Normals, Points};
@@ -75,8 +77,8 @@ pub(crate) struct Scratch {
     /// The largest of them.
     largest: usize,
     chunks: Vec<Chunk>,
-    /// The pixels that take even windows.
-    taken: Marks,
+    /// The pixels that the second pass leaves to their own windows.
+    pub left: Marks,
 }
 
 impl Scratch {
@@ -101,10 +103,22 @@ impl Scratch {
         Ok((std::mem::take(radii), length))
     }
 
+    /// In PCL's semantics, the sides of the windows of a cloud's pixels.
+    pub fn sides(&self, width: usize) -> Sides<'_> {
+        Sides { rows: &self.radii, length: row_length(width), first: 0 }
+    }
+
+    /// The least and the largest magnitude of the depths of these rows.
+    pub fn depths_of(&self, rows: Range<usize>) -> [f32; 2] {
+        self.ranges[rows].iter().fold([f32::INFINITY, 0.0], |[nearest, deepest], row| {
+            [row[0].min(nearest), row[1].max(deepest)]
+        })
+    }
+
     /// Bytes held.
     pub fn size(&self) -> usize {
-        let Scratch { depths, ranges, radii, chunks, taken, .. } = self;
-        depths.size() + bytes(ranges) + radii.size() + bytes(chunks) + taken.size()
+        let Scratch { depths, ranges, radii, chunks, left, .. } = self;
+        depths.size() + bytes(ranges) + radii.size() + bytes(chunks) + left.size()
     }
 }
 
@@ -145,30 +159,46 @@ pub(crate) fn compute(
     job.tiles(scratch, indices, normals, None)
 }
 
-/// As [`compute`], of the pixels that take no even window; the others are not written. Their windows are those that
-/// [`Job::radii`] has found.
-pub(crate) fn compute_own(
+/// Finds the pixels that take no even window but have one of their own.
+pub(crate) fn find_left(
     job: &Job,
     choices: &[u32],
+    scratch: &mut super::Scratch,
+) -> Result<(), Error> {
+    let (width, height) = (job.points.width(), job.points.height());
+    let mut left = std::mem::take(&mut scratch.paper.left);
+    left.clear((width, height))?;
+    let rows = left.rows().zip(choices.chunks(width)).enumerate();
+    scratch.workers.each(rows, |(y, (left, choices))| {
+        let sizes = job.sizes(scratch, y).chunks(WORD);
+        for (left, (choices, sizes)) in left.iter_mut().zip(choices.chunks(WORD).zip(sizes)) {
+            // Mostly all take one.
+            if choices.contains(&NO_WINDOW) {
+                let pixels = choices.iter().zip(sizes);
+                *left = word_of(pixels.map(|(choice, size)| *choice == NO_WINDOW && *size > 0.0));
+            }
+        }
+    });
+    scratch.paper.left = left;
+    Ok(())
+}
+
+/// As [`compute`], of the pixels that [`find_left`] has found, in the windows that [`Job::radii`] has; the others are not
+/// written.
+pub(crate) fn compute_left(
+    job: &Job,
     indices: Option<&[i32]>,
     normals: &Normals,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
-    let (width, height) = (job.points.width(), job.points.height());
-    let mut taken = std::mem::take(&mut scratch.paper.taken);
-    taken.clear((width, height))?;
-    scratch.workers.each(taken.rows().zip(choices.chunks(width)), |(taken, choices)| {
-        for (word, choices) in taken.iter_mut().zip(choices.chunks(WORD)) {
-            *word = word_of(choices.iter().map(|choice| *choice != NO_WINDOW));
-        }
-    });
-    let done = job.tiles(scratch, indices, normals, Some(&taken));
-    scratch.paper.taken = taken;
+    let left = std::mem::take(&mut scratch.paper.left);
+    let done = job.tiles(scratch, indices, normals, Some(&left));
+    scratch.paper.left = left;
     done
 }
 
-/// Writes the normals of the pixels that take even windows; if their points are given, those of pixels that could but take
-/// none; and with one-sided windows those of pixels that have none then, from the points around them.
+/// Writes the normals of the pixels that take even windows, and none for those that have no window; if their points are given,
+/// those of pixels left; and with one-sided windows those of pixels that have none then, from the points around them.
 pub(crate) fn write_chosen(
     job: &Job,
     second_pass: &SecondPass,
@@ -179,8 +209,8 @@ pub(crate) fn write_chosen(
 ) {
     let options = job.options;
     scratch.workers.for_each(cloud.height, |_, y| {
-        let of_left = of_left.map(|points| (points, job.sizes(scratch, y)));
-        let row = ChosenRow { cloud, options, second_pass, normals, y, of_left };
+        let sizes = job.sizes(scratch, y);
+        let row = ChosenRow { cloud, options, second_pass, normals, y, sizes, of_left };
         // SAFETY: the processor has the instruction set, and every row falls to one thread.
         unsafe { paths::run(job.isa, row) };
     });
@@ -321,57 +351,33 @@ fn share_out(
     refill(chunks, first_rows.map(chunk))
 }
 
-/// The image in tiles of like sizes.
-struct Grid {
-    width: usize,
-    height: usize,
-    /// How far windows reach from their pixels.
-    reach: usize,
-    /// Bytes of a column in a row of the rings.
-    column: usize,
-    /// Of a tile.
-    columns: usize,
-    rows: usize,
-    across: usize,
-    down: usize,
+/// Tiles for windows that reach so far from their pixels, in rings of so many bytes a column and row.
+fn tiling(width: usize, height: usize, reach: usize, column: usize) -> Tiling {
+    let ring = rows_of_rings(reach, height);
+    let columns = (RING_BYTES / (column * ring)).max(4 * reach);
+    let columns = columns.min(MOST_INDICES / ring - 2 * reach - 4 * GROUP);
+    let across = width.div_ceil(columns.next_multiple_of(GROUP));
+    let columns = width.div_ceil(across).next_multiple_of(BLOCK * GROUP);
+    let down = height.div_ceil(TILE_ROWS);
+    let rows = height.div_ceil(down).next_multiple_of(BLOCK);
+    Tiling::new((width, height), (columns, rows))
 }
 
-impl Grid {
-    /// Tiles for windows that reach so far from their pixels, in rings of so many bytes a column and row.
-    fn new(width: usize, height: usize, reach: usize, column: usize) -> Self {
-        let ring = rows_of_rings(reach, height);
-        let columns = (RING_BYTES / (column * ring)).max(4 * reach);
-        let columns = columns.min(MOST_INDICES / ring - 2 * reach - 4 * GROUP);
-        let across = width.div_ceil(columns.next_multiple_of(GROUP));
-        let columns = width.div_ceil(across).next_multiple_of(BLOCK * GROUP);
-        let down = height.div_ceil(TILE_ROWS);
-        let rows = height.div_ceil(down).next_multiple_of(BLOCK);
-        Grid { width, height, reach, column, columns, rows, across, down }
-    }
-
-    fn count(&self) -> usize {
-        self.across * self.down
-    }
-
-    /// The room that there is to be for rings, of which `size` tells it by columns and rows: those of the tiles, and of tiles
-    /// for smaller windows, or larger ones up to `limit`.
-    fn room(&self, limit: u32, size: impl Fn(usize, usize) -> usize) -> usize {
-        let &Grid { width, height, column, .. } = self;
-        let of_reach = |reach: usize| {
-            let columns = Grid::new(width, height, reach, column).columns + 2 * reach;
-            size(columns.min(width), rows_of_rings(reach, height))
-        };
-        let most = self.reach.max(ROOMY_RADIUS.min(limit as usize));
-        (0..=most).map(of_reach).max().expect("a radius")
-    }
-
-    /// The columns and rows of a tile, which start with a block; none where the tiles before have covered all.
-    fn tile(&self, item: usize) -> Option<(Range<usize>, Range<usize>)> {
-        let (row, column) = (item / self.across * self.rows, item % self.across * self.columns);
-        let columns = column..(column + self.columns).min(self.width);
-        let rows = row..(row + self.rows).min(self.height);
-        (!columns.is_empty() && !rows.is_empty()).then_some((columns, rows))
-    }
+/// The room that there is to be for rings, of which `size` tells it by columns and rows: those of tiles for windows that reach
+/// so far, or less, or farther up to `limit`.
+fn room(
+    (width, height): (usize, usize),
+    reach: usize,
+    column: usize,
+    limit: u32,
+    size: impl Fn(usize, usize) -> usize,
+) -> usize {
+    let of_reach = |reach: usize| {
+        let columns = tiling(width, height, reach, column).columns + 2 * reach;
+        size(columns.min(width), rows_of_rings(reach, height))
+    };
+    let most = reach.max(ROOMY_RADIUS.min(limit as usize));
+    (0..=most).map(of_reach).max().expect("a radius")
 }
 
 /// One computation.
@@ -463,43 +469,58 @@ impl Job<'_> {
         (&depths[y * length..][..length], &radii[place * length..][..length])
     }
 
-    /// The normals, tile by tile, of the pixels that are not left out.
+    /// The normals, tile by tile, of all pixels, or of those that are left.
     #[inline(never)]
     fn tiles(
         &self,
         scratch: &mut super::Scratch,
         indices: Option<&[i32]>,
         normals: &Normals,
-        left_out: Option<&Marks>,
+        left: Option<&Marks>,
     ) -> Result<(), Error> {
         let &Job { points, options, .. } = self;
         let super::Scratch { workers, each, listed, paper, .. } = scratch;
         let (width, height, largest) = (points.width(), points.height(), paper.largest);
         let sink = Sink::new(normals, indices, width, listed)?;
         let row = &|y: usize| self.row(paper, y);
-        let grid = Grid::new(width, height, largest, column(options.method));
+        let column = column(options.method);
+        let tiling = tiling(width, height, largest, column);
         let limit = options.paper.largest_radius;
-        let room = grid.room(limit, elements_of_rings);
+        let room = |size: fn(_, _) -> usize| room((width, height), largest, column, limit, size);
+        let rings = room(elements_of_rings);
         for scratch in &each[..workers.count()] {
             let WorkerScratch { moments, gradients, depth_changes, waiting, .. } =
                 &mut lock(scratch).paper;
-            waiting.reserve(width, grid.rows)?;
+            waiting.reserve(width, tiling.rows)?;
             match options.method {
-                Method::CovarianceMatrix => moments.reserve(room)?,
+                Method::CovarianceMatrix => moments.reserve(rings)?,
                 Method::AverageDepthChange => {
-                    depth_changes.reserve(room)?;
-                    depth_changes.presence.reserve(grid.room(limit, presence_of_rings))?;
+                    depth_changes.reserve(rings)?;
+                    depth_changes.presence.reserve(room(presence_of_rings))?;
                 }
-                Method::Average3DGradient | Method::Simple3DGradient => gradients.reserve(room)?,
+                Method::Average3DGradient | Method::Simple3DGradient => gradients.reserve(rings)?,
             }
         }
-        workers.for_each(grid.count(), |worker, item| {
-            let Some((columns, rows)) = grid.tile(item) else { return };
-            let tile = Tile { points, options, columns, rows, largest, row, left_out };
+        let radii = |y: usize| row(y).1;
+        let (tiling, written) = match left {
+            Some(left) => {
+                (tiling.or_cells(left, radii, |radius| radius as usize), Written::Only(left))
+            }
+            None => (tiling, Written::All),
+        };
+        workers.for_each(tiling.count(), |worker, item| {
+            let tile = tiling.tile(item);
+            let part = match left {
+                Some(left) => part(tile, left, radii),
+                None => Some((tile, largest as f32)),
+            };
+            let Some(((columns, rows), largest)) = part else { return };
+            let largest = largest as usize;
+            let tile = Tile { points, options, columns, rows, largest, row, written };
             let scratch = &mut lock(&each[worker]).paper;
             let (tile, sink) = (&tile, &sink);
             let WorkerScratch { moments, gradients, depth_changes, waiting, .. } = scratch;
-            each_layer(tile, &paper.ranges, |layer| match options.method {
+            each_layer(tile, paper, |layer| match options.method {
                 Method::CovarianceMatrix => {
                     let method = CovarianceMatrix::about(layer.origin);
                     self.layer(method, tile, layer, moments, waiting, sink)
@@ -548,8 +569,8 @@ impl Job<'_> {
     ) -> Result<(), Error> {
         let &Job { points, options, .. } = self;
         let super::Scratch { workers, each, listed, paper, .. } = scratch;
-        let left_out = own.as_ref().map(|own| own.concerned);
-        let largest = if left_out.is_some() { largest.max(paper.largest) } else { largest };
+        let written = own.as_ref().map_or(Written::All, |own| Written::AllBut(own.concerned));
+        let largest = if own.is_some() { largest.max(paper.largest) } else { largest };
         let (width, height) = (points.width(), points.height());
         let sink = own.map(|own| Sink::new(own.normals, own.indices, width, listed)).transpose()?;
         let length = row_length(width);
@@ -557,19 +578,21 @@ impl Job<'_> {
             Some(_) => self.row(paper, y),
             None => (&paper.depths[y * length..][..length], &[][..]),
         };
-        let grid = Grid::new(width, height, largest, Rings::<MOMENTS>::COLUMN);
-        let room = grid.room(options.paper.largest_radius, elements_of_rings);
+        let column = Rings::<MOMENTS>::COLUMN;
+        let tiling = tiling(width, height, largest, column);
+        let limit = options.paper.largest_radius;
+        let room = room((width, height), largest, column, limit, elements_of_rings);
         for scratch in &each[..workers.count()] {
             let WorkerScratch { moments, waiting, .. } = &mut lock(scratch).paper;
-            waiting.reserve(width, grid.rows)?;
+            waiting.reserve(width, tiling.rows)?;
             moments.reserve(room)?;
         }
-        workers.for_each(grid.count(), |worker, item| {
-            let Some((columns, rows)) = grid.tile(item) else { return };
-            let tile = Tile { points, options, columns, rows, largest, row, left_out };
+        workers.for_each(tiling.count(), |worker, item| {
+            let (columns, rows) = tiling.tile(item);
+            let tile = Tile { points, options, columns, rows, largest, row, written };
             let tile = EvenTile { even, tile, sink: sink.as_ref() };
             let WorkerScratch { moments: rings, waiting, .. } = &mut lock(&each[worker]).paper;
-            each_layer(&tile.tile, &paper.ranges, |layer| {
+            each_layer(&tile.tile, paper, |layer| {
                 let tile = &tile;
                 // SAFETY: the processor has the instruction set, and tiles do not share pixels.
                 unsafe { paths::run(self.isa, EvenTask { tile, layer, rings, waiting }) }
@@ -580,13 +603,10 @@ impl Job<'_> {
 }
 
 /// Has a tile computed layer by layer, of which `compute` returns how deep the nearest point is that pixels wait for.
-/// `ranges` has the rows' depths, of which the farthest in a layer is [`span`] times as deep as the nearest.
-fn each_layer(tile: &Tile, ranges: &[[f32; 2]], mut compute: impl FnMut(&Layer) -> Option<f32>) {
+/// Of its depths, the farthest in a layer is [`span`] times as deep as the nearest.
+fn each_layer(tile: &Tile, scratch: &Scratch, mut compute: impl FnMut(&Layer) -> Option<f32>) {
     let span = span(tile.options.method);
-    let ranges = &ranges[reached(&tile.rows, tile.largest, tile.points.height())];
-    let depths = ranges.iter().fold([f32::INFINITY, 0.0], |[nearest, deepest], row| {
-        [row[0].min(nearest), row[1].max(deepest)]
-    });
+    let depths = scratch.depths_of(reached(&tile.rows, tile.largest, tile.points.height()));
     let mut next = Some(Layer::first(depths, span, tile.largest));
     while let Some(mut layer) = next {
         layer.origin = tile.origin(&layer);

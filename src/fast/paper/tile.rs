@@ -31,8 +31,15 @@ pub(crate) struct Tile<'a> {
     pub largest: usize,
     /// A row's depths, and the radii of its windows, if it has normals: 0 for none. Both can be read up to a whole group.
     pub row: &'a (dyn Fn(usize) -> (&'a [f32], &'a [f32]) + Sync),
-    /// Pixels that are not written.
-    pub left_out: Option<&'a Marks>,
+    pub written: Written<'a>,
+}
+
+/// Which pixels' normals are written, none for those that have no window.
+#[derive(Clone, Copy)]
+pub(crate) enum Written<'a> {
+    All,
+    AllBut(&'a Marks),
+    Only(&'a Marks),
 }
 
 impl Tile<'_> {
@@ -169,7 +176,12 @@ impl Tile<'_> {
         let width = self.points.width();
         let layer = rings.layer;
         let radii = (self.row)(y).1;
-        let left_out = self.left_out.map(|marks| marks.row(y));
+        let (marks, inverted) = match self.written {
+            Written::All => (None, 0),
+            Written::AllBut(marks) => (Some(marks.row(y)), 0),
+            Written::Only(marks) => (Some(marks.row(y)), u32::MAX),
+        };
+        let left_out = |x| marks.map_or(0, |row| marks_from(row, x) as u32 ^ inverted);
         let points = rings.around(y);
         let mut rows = Rows::new(rings, 0, M::EDGE);
         for start in self.columns.clone().step_by(RUN) {
@@ -189,7 +201,7 @@ impl Tile<'_> {
                 unsafe {
                     let eight = S::load(radii[x..].as_ptr());
                     let (pair, shift) = (at / LANES, at % LANES);
-                    let out = left_out.map_or(0, |row| marks_from(row, x) as u32 & all(GROUP));
+                    let out = left_out(x) & all(GROUP);
                     run.left_out[pair] |= out << shift;
                     let windows = S::bits(S::lt(S::splat(0.0), eight))
                         & (asked[pair] >> shift)
