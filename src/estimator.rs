@@ -308,7 +308,7 @@ impl Estimator {
             fast::paper::find_left(&job, second_pass.choices(), scratch)?;
             match options.semantics {
                 Semantics::Pcl => {
-                    fast::compute_left((isa, points, options), indices, normals, scratch)?;
+                    fast::compute_left(isa, points, options, indices, normals, scratch)?;
                 }
                 Semantics::Paper => {
                     fast::paper::compute_left(&job, indices, normals, scratch)?;

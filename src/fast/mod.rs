@@ -199,23 +199,26 @@ pub(crate) fn compute(
     compute_slices(isa, points, options, output, |_, _| (), scratch)
 }
 
-/// As [`compute`], of the pixels that the second pass leaves to their own windows, the sides of which [`sides`] has found;
-/// the others are not written. The job's depths have been read.
+/// As [`compute`], of the pixels that the second pass leaves to their own windows, the sides of which [`sides`] has found; if
+/// these are not few, of all. The job's depths have been read.
 pub(crate) fn compute_left(
-    (isa, points, options): (Isa, &Points, &Options),
+    isa: Isa,
+    points: &Points,
+    options: &Options,
     indices: Option<&[i32]>,
     normals: &Normals,
     scratch: &mut Scratch,
 ) -> Result<(), Error> {
+    let (size, height) = ((points.width(), points.height()), points.height());
     let Scratch { workers, each, listed, paper, .. } = scratch;
-    let (width, height) = (points.width(), points.height());
-    let job = Job::new(isa, points, options);
-    let sink = Sink::new(normals, indices, width, listed)?;
-    let (left, sides) = (&paper.left, paper.sides(width));
+    let (left, sides) = (&paper.left, paper.sides(size.0));
     let row = |y: usize| sides.row(y);
-    let tiling = Tiling::new((width, height), (width, height.div_ceil(job.strips)));
-    let tiling = tiling.or_cells(left, row, |side| side as usize / 2 + 1);
-    let done = workers.try_share(tiling.tiles(), |worker, tiles| {
+    let Some(cells) = Tiling::cells(size, left, row, |side| side as usize / 2 + 1) else {
+        return compute(isa, points, options, indices, normals, scratch);
+    };
+    let job = Job::new(isa, points, options);
+    let sink = Sink::new(normals, indices, size.0, listed)?;
+    let done = workers.try_share(cells.tiles(), |worker, tiles| {
         let sums = &mut lock(&each[worker]).sums;
         sums.frame = Frame::default();
         let parts = tiles.filter_map(|tile| part(tile, left, row));

@@ -8,6 +8,9 @@ use crate::simd::GROUP;
 /// Columns and rows of a small tile.
 const CELL: (usize, usize) = (WORD, 32);
 
+/// Few are one pixel in so many, at most: to look for the parts that more are in takes too long.
+const FEW: usize = 16;
+
 /// The image in tiles of like sizes.
 pub(super) struct Tiling {
     pub width: usize,
@@ -42,21 +45,24 @@ impl Tiling {
         (0..self.count()).map(|item| self.tile(item))
     }
 
-    /// Small tiles, if few pixels are marked, near one another: if what their parts and windows, which `reach` so far, cover
-    /// together is less than the image.
-    pub fn or_cells<'a>(
-        self,
+    /// Small tiles, if few pixels are marked, near one another: if their parts, and what is around these as far as windows of a
+    /// size reach, are less than the image together.
+    pub fn cells<'a>(
+        (width, height): (usize, usize),
         marks: &Marks,
         sizes: impl Fn(usize) -> &'a [f32],
         reach: impl Fn(f32) -> usize,
-    ) -> Self {
-        let cells = Tiling::new((self.width, self.height), CELL);
+    ) -> Option<Self> {
+        if FEW * marks.count() > width * height {
+            return None;
+        }
+        let cells = Tiling::new((width, height), CELL);
         let parts = cells.tiles().filter_map(|tile| part(tile, marks, &sizes));
         let covered = parts.map(|((columns, rows), largest)| {
             let around = 2 * reach(largest);
             (columns.len() + around) * (rows.len() + around)
         });
-        if covered.sum::<usize>() < self.width * self.height { cells } else { self }
+        (covered.sum::<usize>() < width * height).then_some(cells)
     }
 }
 
@@ -124,19 +130,26 @@ mod tests {
         };
         let tiling = Tiling::new(SIZE, (104, 100));
         assert_eq!(parts(&tiling), [((0..96, 0..42), 6.0), ((192..200, 99..100), 3.0)]);
-        let cells = tiling.or_cells(&marks, row, |size| size as usize);
+        let cells = Tiling::cells(SIZE, &marks, row, |size| size as usize).unwrap();
         let of_cells = [((0..8, 0..1), 3.0), ((64..96, 40..42), 6.0), ((192..200, 99..100), 3.0)];
         assert_eq!(parts(&cells), of_cells);
     }
 
     #[test]
-    fn tiles_stay_large_where_much_is_covered() {
-        for (size, step, is_large) in [(1.0, 50, false), (10.0, 8, true), (60.0, 50, true)] {
-            let marks = marks(|x, y| x.is_multiple_of(step) && y.is_multiple_of(step));
+    fn there_are_no_small_tiles_where_much_is_covered() {
+        let on_grid =
+            |step: usize| marks(move |x, y| x.is_multiple_of(step) && y.is_multiple_of(step));
+        let in_corner = |side: usize| marks(move |x, y| x < side && y < side);
+        for (marks, size, is_much) in [
+            (on_grid(50), 1.0, false),
+            (on_grid(50), 60.0, true),
+            (on_grid(8), 10.0, true),
+            (in_corner(32), 1.0, false),
+            (in_corner(40), 1.0, true),
+        ] {
             let sizes = [size; SIZE.0];
-            let tiling = Tiling::new(SIZE, SIZE);
-            let tiling = tiling.or_cells(&marks, |_| &sizes, |size| size as usize);
-            assert_eq!((tiling.columns, tiling.rows) == SIZE, is_large, "{size} {step}");
+            let cells = Tiling::cells(SIZE, &marks, |_| &sizes, |size| size as usize);
+            assert_eq!(cells.is_none(), is_much, "{} of {size}", marks.count());
         }
     }
 }

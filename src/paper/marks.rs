@@ -50,6 +50,11 @@ impl Marks {
         self.words.chunks_mut(rows * self.stride)
     }
 
+    /// How many there are; bits behind the last column are 0.
+    pub fn count(&self) -> usize {
+        self.words.iter().map(|word| word.count_ones() as usize).sum()
+    }
+
     pub fn has(&self, (x, y): (usize, usize)) -> bool {
         from(self.row(y), x) & 1 != 0
     }

@@ -502,19 +502,17 @@ impl Job<'_> {
             }
         }
         let radii = |y: usize| row(y).1;
-        let (tiling, written) = match left {
-            Some(left) => {
-                (tiling.or_cells(left, radii, |radius| radius as usize), Written::Only(left))
-            }
-            None => (tiling, Written::All),
-        };
-        workers.for_each(tiling.count(), |worker, item| {
-            let tile = tiling.tile(item);
-            let part = match left {
-                Some(left) => part(tile, left, radii),
-                None => Some((tile, largest as f32)),
+        let cells = left.and_then(|left| {
+            Some((left, Tiling::cells((width, height), left, radii, |radius| radius as usize)?))
+        });
+        let count = cells.as_ref().map_or(tiling.count(), |(_, cells)| cells.count());
+        let written = left.map_or(Written::All, Written::Only);
+        workers.for_each(count, |worker, item| {
+            let place = match &cells {
+                Some((left, cells)) => part(cells.tile(item), left, radii),
+                None => Some((tiling.tile(item), largest as f32)),
             };
-            let Some(((columns, rows), largest)) = part else { return };
+            let Some(((columns, rows), largest)) = place else { return };
             let largest = largest as usize;
             let tile = Tile { points, options, columns, rows, largest, row, written };
             let scratch = &mut lock(&each[worker]).paper;
