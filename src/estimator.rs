@@ -315,7 +315,7 @@ impl Estimator {
                 }
             }
         }
-        // Of the others only a few are left.
+        // Of these hardly any is left: they are summed one by one.
         let of_left = is_along.then_some(points);
         let (scratch, workers, width) = (&*scratch, scratch.workers(), cloud.width);
         if indices.is_none() {

@@ -209,20 +209,19 @@ pub(crate) fn compute_left(
     normals: &Normals,
     scratch: &mut Scratch,
 ) -> Result<(), Error> {
-    let (size, height) = ((points.width(), points.height()), points.height());
+    let size @ (width, height) = (points.width(), points.height());
     let Scratch { workers, each, listed, paper, .. } = scratch;
-    let (left, sides) = (&paper.left, paper.sides(size.0));
+    let (left, sides) = (&paper.left, paper.sides(width));
     let row = |y: usize| sides.row(y);
     let Some(cells) = Tiling::cells(size, left, row, |side| side as usize / 2 + 1) else {
         return compute(isa, points, options, indices, normals, scratch);
     };
     let job = Job::new(isa, points, options);
-    let sink = Sink::new(normals, indices, size.0, listed)?;
+    let sink = Sink::new(normals, indices, width, listed)?;
     let done = workers.try_share(cells.tiles(), |worker, tiles| {
         let sums = &mut lock(&each[worker]).sums;
         sums.frame = Frame::default();
-        let parts = tiles.filter_map(|tile| part(tile, left, row));
-        for ((columns, rows), side) in parts {
+        for ((columns, rows), side) in tiles.filter_map(|tile| part(tile, left, row)) {
             let side = side as usize;
             let reach = side + 2;
             let around = rows.start.saturating_sub(reach)..(rows.end + reach).min(height);
