@@ -308,12 +308,10 @@ impl Estimator {
             fast::paper::find_left(&job, second_pass.choices(), scratch)?;
             match options.semantics {
                 Semantics::Pcl => {
-                    fast::compute_left(isa, points, options, indices, normals, scratch)?;
+                    fast::compute_left(isa, points, options, indices, normals, scratch)
                 }
-                Semantics::Paper => {
-                    fast::paper::compute_left(&job, indices, normals, scratch)?;
-                }
-            }
+                Semantics::Paper => fast::paper::compute_left(&job, indices, normals, scratch),
+            }?;
         }
         // Of these hardly any is left: they are summed one by one.
         let of_left = is_along.then_some(points);

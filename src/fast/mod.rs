@@ -43,7 +43,7 @@ use sink::Sink;
 use strip_pairs::StripPairs;
 use strips::Strips;
 use tile::{Sums, Tile};
-use tiling::{Tiling, part};
+use tiling::{Tiling, part, reached};
 use windows::{Sides, Windows, reach};
 
 use crate::Error;
@@ -224,8 +224,8 @@ pub(crate) fn compute_left(
         for ((columns, rows), side) in tiles.filter_map(|tile| part(tile, left, row)) {
             let side = side as usize;
             let reach = side + 2;
-            let around = rows.start.saturating_sub(reach)..(rows.end + reach).min(height);
-            let strip = Strip { columns, rows, side, reach, depths: paper.depths_of(around) };
+            let depths = paper.depths_of(reached(&rows, reach, height));
+            let strip = Strip { columns, rows, side, reach, depths };
             job.strip(strip, (sides, Some(left)), sums, &sink)?;
         }
         Ok(())
@@ -402,8 +402,7 @@ impl<'a> Job<'a> {
         let &Job { points, options, image: Image { width, height, .. }, .. } = self;
         let own = windows.swept(rows.clone());
         let reach = reach(points, options, own.deepest());
-        let around = rows.start.saturating_sub(reach)..(rows.end + reach).min(height);
-        let around = windows.swept(around);
+        let around = windows.swept(reached(&rows, reach, height));
         let depths = [around.nearest(), around.deepest()];
         let strip = Strip { columns: 0..width, rows, side: own.side as usize, reach, depths };
         self.strip(strip, (windows.sides(width), None), scratch, sink)?;

@@ -66,6 +66,11 @@ impl Tiling {
     }
 }
 
+/// The columns or rows, of so many, that windows of those in `range` reach at a distance from their pixels at most.
+pub(crate) fn reached(range: &Range<usize>, reach: usize, count: usize) -> Range<usize> {
+    range.start.saturating_sub(reach)..(range.end + reach).min(count)
+}
+
 /// The part of a tile with the pixels that are marked, if there are some, and the size of the largest of their windows;
 /// `sizes` are those of a row's pixels.
 pub(super) fn part<'a>(

@@ -50,7 +50,7 @@ impl Marks {
         self.words.chunks_mut(rows * self.stride)
     }
 
-    /// How many there are; bits behind the last column are 0.
+    /// How many there are, if bits behind the last column are 0.
     pub fn count(&self) -> usize {
         self.words.iter().map(|word| word.count_ones() as usize).sum()
     }

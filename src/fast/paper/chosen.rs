@@ -23,8 +23,9 @@ pub(super) struct ChosenRow<'a> {
     pub of_left: Option<&'a Points<'a>>,
 }
 
-/// Writes them; the others stay as they are, but with one-sided windows those without a normal get one from the points
-/// around them. It asks that the row is inside the normals, all of which were written, and that no other thread writes it.
+/// Writes them, and none for pixels that have no window at all; the others stay as they are, but with one-sided windows those
+/// without a normal get one from the points around them. It asks that the row is inside the normals, that the others were
+/// written, and that no other thread writes it.
 impl Task for ChosenRow<'_> {
     type Output = ();
 

@@ -67,11 +67,6 @@ pub(crate) struct Aimed {
     first: usize,
 }
 
-/// The columns or rows, of so many, that windows of those in `range` reach at a distance from their pixels at most.
-pub(crate) fn reached(range: &Range<usize>, reach: usize, count: usize) -> Range<usize> {
-    range.start.saturating_sub(reach)..(range.end + reach).min(count)
-}
-
 /// Rows of the rings for windows that reach a distance from their pixels, in an image of this height: theirs, and
 /// those above and below.
 pub(crate) fn rows_of_rings(reach: usize, height: usize) -> usize {

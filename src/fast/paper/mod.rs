@@ -26,7 +26,7 @@ pub(crate) use engine::FastEngine;
 use chosen::ChosenRow;
 use depths::{OneRow, PointRows, room_for_columns, row_length};
 use even_windows::{Even, EvenTile};
-use integrals::{Rings, elements_of_rings, presence_of_rings, reached, rows_of_rings};
+use integrals::{Rings, elements_of_rings, presence_of_rings, rows_of_rings};
 use layers::{Layer, Waiting};
 use methods::{CovarianceMatrix, Gradients, MOMENTS, SmoothedDepthChanges, Sums};
 use tile::{Tile, Written};
@@ -35,7 +35,7 @@ use windows::{Rows, Sweep, reach};
 use super::buffer::Buffer;
 use super::paths::{self, Task};
 use super::sink::Sink;
-use super::tiling::{Tiling, part};
+use super::tiling::{Tiling, part, reached};
 use super::windows::Sides;
 use super::{Parts, lock};
 use crate::Error;
@@ -344,7 +344,7 @@ fn share_out(
     let first_rows = (0..height).step_by(per_chunk);
     let chunk = |first: usize| {
         let own = first..(first + per_chunk).min(height);
-        let swept = own.start.saturating_sub(reach)..(own.end + reach).min(height);
+        let swept = reached(&own, reach, height);
         start += swept.len();
         Chunk { own, start: start - swept.len(), swept }
     };

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::integrals::{Rings, WEIGHT, reached};
+use super::integrals::{Rings, WEIGHT};
 use super::layers::{Layer, Waiting, with_fraction};
 use super::methods::Sums;
 use super::rects::{Pixels, Rects, Rows};
@@ -14,6 +14,7 @@ use crate::fast::one_point::of_one_point;
 use crate::fast::run::{Noted, OfRun, RUN};
 use crate::fast::sink::Sink;
 use crate::fast::tile::{Bits, Estimates, all, from_middle};
+use crate::fast::tiling::reached;
 use crate::methods::Estimate;
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
