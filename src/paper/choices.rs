@@ -37,16 +37,8 @@ pub(crate) const NEXT: f32 = 9.0;
 /// at most this share of what the others' may be of. With more, small steps come out as ramps; with less, what windows differ in
 /// is mistaken for an edge.
 const NO_EDGE: f32 = 0.9;
-/// Depths are exact if more than this share of the windows that a pixel can take says so.
-pub(crate) const EXACT_SHARE: f32 = 0.25;
 
 impl EvenWindow {
-    /// Whether its depths are without noise. Those that a sensor rounds look so where all are alike, so only a window
-    /// in which they change tells.
-    fn is_exact(&self, least_noise: f32) -> bool {
-        self.noise < least_noise && self.steepness * self.steepness > least_noise
-    }
-
     /// What one of a mean square deviation that is not noise costs.
     fn per_misfit(&self) -> f32 {
         let side = 2.0 * self.radius + 1.0;
@@ -111,7 +103,7 @@ impl EvenWindows<'_> {
         };
         let is_no_more_even = |block: usize| {
             let EvenWindow { radius, noise, .. } = windows[block];
-            radius < own.radius || own.unevenness <= NO_EDGE * noise.max(asked.least_noise)
+            radius < own.radius || own.unevenness <= NO_EDGE * noise.max(asked.noise.least)
         };
         radius >= BLOCK
             && is_full(block)
@@ -179,9 +171,8 @@ struct Candidates<'a> {
     /// The block's middle, inside the image or not.
     middle: [usize; 2],
     windows: Vec<Candidate>,
-    /// The least variance among them, and whether they say that depths are exact.
+    /// The least variance among them.
     noise: f32,
-    is_exact: bool,
 }
 
 impl<'a> Candidates<'a> {
@@ -191,19 +182,16 @@ impl<'a> Candidates<'a> {
         let (column, row) = blocks.place(block);
         let middle = [column, row].map(|line| line * BLOCK + MIDDLE);
         let (windows, noise) = (Vec::new(), f32::INFINITY);
-        let mut found = Candidates { even, middle, windows, noise, is_exact: false };
-        let mut exact = 0.0;
+        let mut found = Candidates { even, middle, windows, noise };
         even.for_each_place(block, |place| {
             let window = even.windows[place];
             let middle = found.way(blocks.middle(place));
             if window.radius > 0.0 && length(middle) <= window.radius + REACH {
                 found.noise = window.noise.min(found.noise);
-                exact += f32::from(window.is_exact(asked.least_noise));
                 found.windows.push(Candidate { place, window, middle, cost: f32::INFINITY });
             }
         });
-        found.noise = found.noise.max(asked.least_noise);
-        found.is_exact = exact > EXACT_SHARE * found.windows.len() as f32;
+        found.noise = found.noise.max(asked.noise.floor);
         for Candidate { window, cost, .. } in &mut found.windows {
             let misfit = (window.unevenness - found.noise).max(0.0);
             *cost = found.noise * window.per_noise + misfit * window.per_misfit();
@@ -339,7 +327,7 @@ impl<'a> Candidates<'a> {
         let is_clean = !asked.clean.spoilt.has((x, y));
         let is_whole = rect.area() as f32 == NEXT && !mean.is_nan();
         let noise = NEAR_NOISE * self.noise;
-        if is_whole && is_clean && !self.is_exact {
+        if is_whole && is_clean && !asked.noise.is_none {
             Near { inverse_depth: mean, noise: noise * asked.noise_share() }
         } else {
             Near { inverse_depth: inverse(x, y), noise }

@@ -9,12 +9,11 @@ use super::blocks::{BLOCK, Blocks, MIDDLE};
 use super::choices::NEXT;
 use super::cloud::Cloud;
 use super::depth_change::Clean;
+use super::noise::Noise;
 use super::planes::{Plane, estimate_in_space};
 use crate::methods::Estimate;
 use crate::rect::Rect;
 
-/// Inverse depths that deviate less than this many alpha from a plane are as good as in it.
-const EVEN: f32 = 0.02;
 /// Small samples have, by chance, variances below the noise's. A window is even if its variance is at most this many
 /// standard deviations of a sample's variance above that of the window of half its radius; and the noise's variance is
 /// taken to be as far above the least one of all windows that a pixel can take.
@@ -63,10 +62,7 @@ pub(crate) struct Asked<'a> {
     pub clean: Clean<'a>,
     /// The largest radius of all.
     pub limit: u32,
-    /// The smallest variance that is told from none.
-    pub least_noise: f32,
-    /// How many pixels have the same noise, as [`noise_area`](super::noise::noise_area) tells it.
-    pub noise_area: f32,
+    pub noise: Noise,
     /// Whether estimates have a curvature.
     pub has_curvature: bool,
 }
@@ -94,7 +90,7 @@ impl Asked<'_> {
 
     /// The variance of the mean of a pixel and those next to it, as a share of one point's.
     pub fn noise_share(&self) -> f32 {
-        self.noise_area.min(NEXT) / NEXT
+        self.noise.area.min(NEXT) / NEXT
     }
 
     /// The estimate from a window with this plane.
@@ -102,11 +98,6 @@ impl Asked<'_> {
         let found = if is_jagged { estimate_in_space(&plane.covariance) } else { plane.estimate() };
         let curvature = if self.has_curvature { found.curvature } else { f32::NAN };
         Estimate { curvature, ..found }.into()
-    }
-
-    /// The variance told from none where the sensor's smallest depth change is `alpha`.
-    pub fn least_noise(alpha: f32) -> f32 {
-        (EVEN * alpha).powi(2)
     }
 }
 
@@ -140,7 +131,7 @@ fn find_even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<(EvenW
         let jagged = (plane.points / longer as f64 / JAGGED_LINES).min(JAGGED);
         let steep = jagged * jagged * plane.steepness_squared;
         let is_jagged = plane.unevenness <= steep
-            && f64::from(asked.least_noise) <= steep
+            && f64::from(asked.noise.least) <= steep
             && plane.points >= JAGGED_POINTS * rect.area() as f64;
         is_jagged.then_some((radius, plane))
     };
@@ -149,15 +140,15 @@ fn find_even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<(EvenW
     // The plane takes as much of the noise's variance as so many points have.
     let noise_beyond = |plane: &Plane, taken: f32| {
         let (told, left) = (plane.points as f32 - 3.0, plane.points as f32 - taken);
-        let chance = (2.0 * asked.noise_area / left).sqrt();
+        let chance = (2.0 * asked.noise.area / left).sqrt();
         plane.unevenness * f64::from(told / left * (1.0 + CHANCE * chance))
     };
-    let noise = |plane: &Plane| noise_beyond(plane, 3.0);
-    let least_noise = f64::from(asked.least_noise);
+    let noise = |plane: &Plane| if asked.noise.is_none { 0.0 } else { noise_beyond(plane, 3.0) };
+    let least_noise = f64::from(asked.noise.least);
     let in_relief = |found: &Plane, radius: u32| {
         let is_rough = radius / 2 >= RELIEF_RADIUS && RELIEF * least_noise < found.unevenness;
         let quarter = is_rough.then(|| plane(radius / 4))??;
-        let taken = 3.0 * asked.noise_area;
+        let taken = 3.0 * asked.noise.area;
         let is_even = || found.unevenness < noise_beyond(&quarter, taken).max(least_noise);
         (taken < quarter.points as f32 && !is_even()).then_some(quarter)
     };
@@ -176,7 +167,7 @@ fn find_even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<(EvenW
                 }
                 let sides2 = [radius, radius / 2].map(|radius| (2 * radius + 1).pow(2));
                 let sides2 = f64::from(sides2[0] - sides2[1]);
-                let bend2 = found.bend2(&half, sides2, least_noise, asked.noise_area.into());
+                let bend2 = found.bend2(&half, sides2, least_noise, asked.noise.area.into());
                 return Some((radius, found, bend2));
             }
             (radius, found) = (radius / 2, half);
@@ -193,7 +184,7 @@ fn find_even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<(EvenW
         steepness: plane.steepness_squared.sqrt() as f32,
         unevenness: plane.unevenness as f32,
         noise: noise(&plane) as f32,
-        per_noise: 12.0 * asked.noise_area / points / (side * side),
+        per_noise: 12.0 * asked.noise.area / points / (side * side),
         bend2: bend2 as f32,
     };
     Some((window, asked.estimate(&plane, is_jagged)))

@@ -23,8 +23,8 @@ mod surroundings;
 
 pub(crate) use blocks::{BLOCK, Blocks, MIDDLE, middle};
 pub(crate) use choices::{
-    ALIKE, CREASE_COST, CREASE_NOISE, EXACT_SHARE, EvenWindows, MISFIT, NEAR_NOISE, NEXT,
-    NO_WINDOW, REACH, places_at,
+    ALIKE, CREASE_COST, CREASE_NOISE, EvenWindows, MISFIT, NEAR_NOISE, NEXT, NO_WINDOW, REACH,
+    places_at,
 };
 pub(crate) use cloud::{Cleaned, Cloud};
 pub(crate) use depth_change::{DepthChanges, between};
@@ -34,6 +34,7 @@ pub(crate) use even_windows::{
 };
 pub(crate) use marks::{Marks, WORD, columns as columns_of, from as marks_from, mark, word_of};
 pub(crate) use methods::estimate as plain_estimate;
+pub(crate) use noise::Noise;
 pub(crate) use planes::{JITTER, Plane, estimate_in_space, inverse_depth};
 pub(crate) use second_pass::{Engine, SecondPass, Windows};
 pub(crate) use smoothing_area::window;

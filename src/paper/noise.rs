@@ -1,4 +1,4 @@
-//! Whether neighbouring pixels have the same noise: a sensor's matching windows and filters make it so.
+//! Whether depths have noise, and neighbouring pixels the same: a sensor's matching windows and filters make it so.
 
 use super::blocks::Blocks;
 use super::cloud::Cloud;
@@ -6,9 +6,19 @@ use super::depth_change::Clean;
 use super::planes::{Plane, inverse_depth};
 use crate::rect::Rect;
 
-/// Windows are looked at in so many columns and rows of the image; so many at least must tell.
+/// Inverse depths that deviate less than this many alpha from a plane are as good as in it.
+const EVEN: f32 = 0.02;
+
+/// Windows are looked at in places in so many columns and rows of the image; so many at least must tell.
 const SAMPLES: usize = 10;
 const FEWEST: usize = 16;
+
+/// Depths are exact if in more than an eighth of all places the points of a small window lie in a plane, but for less than this
+/// share of the variance that is told from none. Noise that many pixels share, or that was made smooth by a filter or filled
+/// in between fewer pixels, leaves more.
+const EXACT: f32 = 0.01;
+const EXACT_RADIUS: usize = 3;
+const EIGHTH: Places = Places { part: 8, radius: EXACT_RADIUS, are_scattered: true };
 
 /// Their radii: small enough for noise that few neighbours share, and twice as large or more.
 const SMALL: [usize; 2] = [2, 5];
@@ -25,18 +35,58 @@ const ROUND: f64 = 0.08;
 const OWN_DIFFERENCES: f64 = 0.9;
 const LAG: usize = 3;
 
-/// How many pixels have the same noise: n points tell of a plane as much as that many times fewer with noise of their own.
-/// 1 if each pixel has its own.
+const MEDIAN: Places = Places { part: 2, radius: FARTHEST, are_scattered: false };
+
+/// What an image's depths tell of their noise.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Noise {
+    /// Whether there is none, as in a simulator's depths: whatever is uneven is relief.
+    pub is_none: bool,
+    /// The smallest variance of inverse depths that is told from none.
+    pub least: f32,
+    /// The smallest that depths may have beside a plane that is theirs: the same, or less where there is no noise.
+    pub floor: f32,
+    /// How many pixels have the same noise: n points tell of a plane as much as that many times fewer with noise of their own.
+    /// 1 if each pixel has its own.
+    pub area: f32,
+}
+
+impl Noise {
+    /// Where the sensor's smallest depth change is `alpha`.
+    pub fn of(cloud: &Cloud, blocks: &Blocks, clean: &Clean, alpha: f32) -> Noise {
+        let least = (EVEN * alpha).powi(2);
+        if are_exact(cloud, blocks, clean, least) {
+            return Noise { is_none: true, least, floor: EXACT * least, area: 1.0 };
+        }
+        let area = area(cloud, blocks, clean, least);
+        Noise { is_none: false, least, floor: least, area }
+    }
+}
+
+/// Whether depths are without noise.
+fn are_exact(cloud: &Cloud, blocks: &Blocks, clean: &Clean, least_noise: f32) -> bool {
+    let unevenness = |pixel| {
+        let rect = Rect::around(pixel, EXACT_RADIUS, (cloud.width, cloud.height));
+        let plane = Plane::of(cloud, &rect)?;
+        // Depths that a sensor rounds are alike here and there.
+        (plane.steepness_squared > least_noise.into()).then_some(plane.unevenness)
+    };
+    EIGHTH
+        .quantile(blocks, clean, unevenness)
+        .is_some_and(|unevenness| unevenness < f64::from(EXACT * least_noise))
+}
+
+/// How many pixels have the same noise, if there is some.
 ///
 /// A plane follows what is alike in `area` pixels: of the variance in n points it takes the share 3 `area` / n, or as that
 /// grows leaves exp(-3 `area` / n). Small windows and differences tell best whether there is such an area, as surfaces are
 /// plane there, and larger windows how large it is.
-pub(crate) fn noise_area(cloud: &Cloud, blocks: &Blocks, clean: &Clean, least_noise: f32) -> f32 {
+fn area(cloud: &Cloud, blocks: &Blocks, clean: &Clean, least_noise: f32) -> f32 {
     let of_windows = |radii: [usize; 2]| {
-        median(blocks, clean, |pixel| share(cloud, pixel, radii, least_noise.into()))
+        MEDIAN.quantile(blocks, clean, |pixel| share(cloud, pixel, radii, least_noise.into()))
     };
     let of_differences = || {
-        median(blocks, clean, |pixel| {
+        MEDIAN.quantile(blocks, clean, |pixel| {
             let [along, down] = [0, 1].map(|axis| {
                 let [near, far] = [1, LAG].map(|lag| differences(cloud, pixel, axis, lag));
                 near / far
@@ -53,27 +103,42 @@ pub(crate) fn noise_area(cloud: &Cloud, blocks: &Blocks, clean: &Clean, least_no
     area.max(1.0).min(large) as f32
 }
 
-/// The median of what the places around which no depth change is near tell; none if few do.
-fn median(
-    blocks: &Blocks,
-    clean: &Clean,
-    tell: impl Fn((usize, usize)) -> Option<f64>,
-) -> Option<f64> {
-    let line = |number: usize, count: usize| (2 * number + 1) * count / (2 * SAMPLES);
-    let (mut told, mut count) = ([0.0; SAMPLES * SAMPLES], 0);
-    for sample in 0..told.len() {
-        let column = line(sample % SAMPLES, blocks.across);
-        let row = line(sample / SAMPLES, blocks.down);
-        if clean.radii[row * blocks.across + column] as usize >= FARTHEST
-            && let Some(value) = tell(blocks.middle_of((column, row)))
-        {
-            told[count] = value;
-            count += 1;
+/// The places that are asked: those around which no depth change is as near as `radius`, in rows and columns that others are in
+/// too or, as stairs are alike along these, each in its own.
+struct Places {
+    part: usize,
+    radius: usize,
+    are_scattered: bool,
+}
+
+impl Places {
+    /// What no more than one `part`-th of those that tell something is below; none if few do.
+    fn quantile(
+        &self,
+        blocks: &Blocks,
+        clean: &Clean,
+        tell: impl Fn((usize, usize)) -> Option<f64>,
+    ) -> Option<f64> {
+        let (mut told, mut count) = ([0.0; SAMPLES * SAMPLES], 0);
+        for sample in 0..told.len() {
+            let (x, y) = (sample % SAMPLES, sample / SAMPLES);
+            // Hammersley's points: a number, and the same with its digits in reverse.
+            let (dx, dy) = if self.are_scattered { (y, x) } else { (SAMPLES / 2, SAMPLES / 2) };
+            let line = |whole: usize, part: usize, lines: usize| {
+                (2 * (whole * SAMPLES + part) + 1) * lines / (2 * SAMPLES * SAMPLES)
+            };
+            let (column, row) = (line(x, dx, blocks.across), line(y, dy, blocks.down));
+            if clean.radii[row * blocks.across + column] as usize >= self.radius
+                && let Some(value) = tell(blocks.middle_of((column, row)))
+            {
+                told[count] = value;
+                count += 1;
+            }
         }
+        let told = &mut told[..count];
+        told.sort_unstable_by(f64::total_cmp);
+        (count >= FEWEST).then(|| told[count / self.part])
     }
-    let told = &mut told[..count];
-    told.sort_unstable_by(f64::total_cmp);
-    (count >= FEWEST).then(|| told[count / 2])
 }
 
 /// The share of the variance in the window of the larger radius around a pixel that is left in that of the smaller one; none if
@@ -118,10 +183,10 @@ mod tests {
     use crate::threads::Workers;
 
     /// The noise area of a surface with inverse depths of 0.5 and so much noise, a mean over `side` x `side` pixels, on top of
-    /// what `shape` gives.
-    fn area(side: usize, noise: f32, shape: impl Fn([f32; 2]) -> f32) -> f32 {
+    /// what `shape` gives; none if its depths are exact.
+    fn area_of(seed: u32, side: usize, noise: f32, shape: impl Fn([f32; 2]) -> f32) -> Option<f32> {
         let (width, height) = (240, 180);
-        let mut bits = 1_u32;
+        let mut bits = seed;
         let mut random = || {
             bits = bits.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (bits >> 8) as f32 / (1 << 24) as f32 - 0.5
@@ -143,21 +208,26 @@ mod tests {
         let (mut changes, workers) = (DepthChanges::default(), Workers::default());
         crate::paper::find_depth_changes(&mut changes, &cloud, &options, &workers).unwrap();
         let clean = changes.clean((width, height), 20, &workers).unwrap();
-        noise_area(&cloud, &Blocks::of(width, height), &clean, 1e-9)
+        let noise = Noise::of(&cloud, &Blocks::of(width, height), &clean, options.paper.alpha);
+        (!noise.is_none).then_some(noise.area)
+    }
+
+    fn area(side: usize, noise: f32, shape: impl Fn([f32; 2]) -> f32) -> Option<f32> {
+        area_of(1, side, noise, shape)
     }
 
     #[test]
     fn only_noise_that_neighbours_share_has_an_area() {
         for bend in [0.0, 1e-7, -1e-6] {
             let parabola = |[u, v]: [f32; 2]| bend * (u * u + v * v);
-            assert_eq!(area(1, 2e-3, parabola), 1.0, "{bend}");
-            assert_eq!(area(5, 0.0, parabola), 1.0, "{bend}");
-            let areas = [3, 5, 7].map(|side| area(side, 2e-3, parabola));
-            println!("{bend}: {areas:?}");
-            for (side, area) in [3, 5, 7].into_iter().zip(areas) {
+            assert_eq!(area(1, 2e-3, parabola), Some(1.0), "{bend}");
+            assert!(area(1, 0.0, parabola).is_none_or(|area| area == 1.0), "{bend}");
+            for side in [3, 5, 7] {
+                let areas = [1, 2, 3, 4].map(|seed| area_of(seed, side, 2e-3, parabola).unwrap());
+                println!("{bend}, {side}: {areas:?}");
                 // As means over windows change gradually, a plane follows somewhat less of them.
-                let share = area / (side * side) as f32;
-                assert!((0.4..1.2).contains(&share), "{bend}, {side}: {area}");
+                let share = areas.iter().sum::<f32>() / 4.0 / (side * side) as f32;
+                assert!((0.5..1.0).contains(&share), "{bend}, {side}: {areas:?}");
             }
         }
     }
@@ -169,11 +239,37 @@ mod tests {
                 let folds =
                     |at: [f32; 2]| slope * (at[axis].rem_euclid(period) - period / 2.0).abs();
                 let what = format!("axis {axis}, {period} px, {slope}");
-                for noise in [0.0, 2e-3] {
-                    assert_eq!(area(1, noise, folds), 1.0, "{what}, noise {noise}");
-                }
-                assert!(area(5, 2e-3, folds) > 10.0, "{what}");
+                assert_eq!(area(1, 2e-3, folds), Some(1.0), "{what}");
+                assert!(area(1, 0.0, folds).is_none_or(|area| area == 1.0), "{what}");
+                assert!(area(5, 2e-3, folds) > Some(10.0), "{what}");
             }
         }
+    }
+
+    #[test]
+    fn depths_without_noise_are_exact() {
+        for (period, slope) in [(30.0, 1e-3), (50.0, 5e-4), (50.0, 1e-3)] {
+            for across in [0.0, 0.3, 1.0] {
+                let folds = |[u, v]: [f32; 2]| {
+                    slope * ((u + across * v).rem_euclid(period) - period / 2.0).abs()
+                };
+                let what = format!("{period} px, {slope}, {across}");
+                assert_eq!(area(1, 0.0, folds), None, "{what}");
+                for (side, noise) in [(1, 2e-4), (5, 2e-4), (7, 2e-3)] {
+                    assert!(area(side, noise, folds).is_some(), "{what}, {side}, {noise}");
+                }
+            }
+        }
+        let rounded = |[u, _]: [f32; 2]| (u / 4.0).floor() * 1e-3;
+        let filled_in = |[u, v]: [f32; 2]| {
+            let step = |at: f32| (at / 8.0).floor();
+            let noise = |x: f32, y: f32| (x * 12.9898 + y * 78.233).sin() * 1e-3;
+            let (x, y) = (step(u), step(v));
+            let (s, t) = (u / 8.0 - x, v / 8.0 - y);
+            let [above, below] =
+                [y, y + 1.0].map(|y| (1.0 - s) * noise(x, y) + s * noise(x + 1.0, y));
+            (1.0 - t) * above + t * below
+        };
+        assert!(area(1, 0.0, rounded).is_some() && area(1, 0.0, filled_in).is_some());
     }
 }

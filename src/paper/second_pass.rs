@@ -10,7 +10,7 @@ use super::cloud::Cloud;
 use super::depth_change::DepthChanges;
 use super::even_windows::{Asked, EvenWindow};
 use super::marks::{Marks, WORD, from, word_of};
-use super::noise::{FARTHEST, noise_area};
+use super::noise::{FARTHEST, Noise};
 use super::{is_depth_change, smoothing_area, surroundings};
 use crate::Error;
 use crate::cloud::Points;
@@ -125,10 +125,9 @@ impl SecondPass {
         let clean = depth_changes.clean(size, farthest, engine.workers())?;
         let blocks = Blocks::of(cloud.width, cloud.height);
         find_wanted(wanted, cloud, &blocks, options, engine.workers())?;
-        let least_noise = Asked::least_noise(options.paper.alpha);
         let has_curvature = options.method == Method::CovarianceMatrix;
-        let noise_area = noise_area(cloud, &blocks, &clean, least_noise);
-        let asked = Asked { blocks, wanted, clean, limit, least_noise, noise_area, has_curvature };
+        let noise = Noise::of(cloud, &blocks, &clean, options.paper.alpha);
+        let asked = Asked { blocks, wanted, clean, limit, noise, has_curvature };
         // PCL's AVERAGE_DEPTH_CHANGE is farther off on round surfaces than windows beside the pixel are.
         let is_off =
             options.semantics == Semantics::Pcl && options.method == Method::AverageDepthChange;

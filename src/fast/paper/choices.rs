@@ -15,9 +15,8 @@ use crate::fast::windows::threshold;
 use crate::memory::{bytes, make_room, refill, resize};
 use crate::options::{Options, Semantics};
 use crate::paper::{
-    ALIKE, BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EXACT_SHARE, EvenWindow, EvenWindows,
-    JITTER, MIDDLE, MISFIT, NEAR_NOISE, NEXT, NO_WINDOW, REACH, inverse_depth, marks_from,
-    places_at,
+    ALIKE, BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EvenWindow, EvenWindows, JITTER,
+    MIDDLE, MISFIT, NEAR_NOISE, NEXT, NO_WINDOW, REACH, inverse_depth, marks_from, places_at,
 };
 use crate::simd::{Along, Groups, Simd, load_by_fours};
 use crate::vector::dot;
@@ -35,9 +34,8 @@ pub(super) unsafe fn rows<S: Groups>(
     let Blocks { across, .. } = even.asked.blocks;
     let Scratch { concerned, rows: image_rows, candidates } = scratch;
     // SAFETY: as the caller's.
-    let least_noise = unsafe { Floats::<S::Widest>::splat(even.asked.least_noise) };
-    let [noise, there, exact] = [least_noise; 3];
-    let mut found = Found { candidates, number: 0, least_noise, noise, there, exact };
+    let floor = unsafe { Floats::<S::Widest>::splat(even.asked.noise.floor) };
+    let mut found = Found { candidates, number: 0, floor, noise: floor };
     for (row, choices) in rows {
         choices.fill(NO_WINDOW);
         let levels = &even.levels[row * across..][..across];
@@ -323,12 +321,9 @@ struct Found<'a, S: Simd> {
     /// Only so many mean something.
     candidates: &'a mut [Candidates],
     number: usize,
-    /// The least variance that is told from none, and the least among the windows.
-    least_noise: Floats<S>,
+    /// The smallest variance that depths may have, and the least among the windows.
+    floor: Floats<S>,
     noise: Floats<S>,
-    /// How many windows the blocks may take, and how many of these say that depths are exact.
-    there: Floats<S>,
-    exact: Floats<S>,
 }
 
 impl<S: Along> Found<'_, S> {
@@ -342,7 +337,6 @@ impl<S: Along> Found<'_, S> {
         // SAFETY: as the caller's.
         unsafe {
             self.noise = Floats::splat(f32::INFINITY);
-            [self.there, self.exact] = [Floats::splat(0.0); 2];
         }
     }
 
@@ -393,13 +387,6 @@ impl<S: Along> Found<'_, S> {
             S::store(to.unevenness.0.as_mut_ptr(), unevenness);
             S::store(to.per_noise.0.as_mut_ptr(), per_noise);
             self.noise.0 = S::select(may_take, S::min(noise, self.noise.0), self.noise.0);
-            let is_exact = S::and(
-                S::lt(noise, self.least_noise.0),
-                S::lt(self.least_noise.0, (steepness * steepness).0),
-            );
-            let one = S::and(may_take, one);
-            self.there = self.there + Floats(one);
-            self.exact = self.exact + Floats(S::and(is_exact, one));
         }
     }
 
@@ -422,23 +409,13 @@ impl<S: Along> Found<'_, S> {
         }
     }
 
-    /// The mask of the blocks whose windows say that depths are exact.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    unsafe fn is_exact(&self) -> S::F {
-        // SAFETY: as the caller's.
-        unsafe { S::lt((Floats::splat(EXACT_SHARE) * self.there).0, self.exact.0) }
-    }
-
     /// Finds what the windows cost any pixel: all have been added.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn weigh(&mut self) {
-        self.noise = self.noise.max(self.least_noise);
+        self.noise = self.noise.max(self.floor);
         for to in &mut self.candidates[..self.number] {
             // SAFETY: as the caller's.
             unsafe {
@@ -585,9 +562,9 @@ impl Group<'_> {
             for lane in 0..self.blocks.len() {
                 columns[lane] = self.blocks[lane] * BLOCK;
             }
-            let (blocks, noise) = ((&columns, self.blocks.len()), (found.noise, found.is_exact()));
+            let blocks = (&columns, self.blocks.len());
             let mut pixels = MaybeUninit::uninit();
-            let pixels = rows.pixels(self.even, self.row, blocks, noise, &mut pixels);
+            let pixels = rows.pixels(self.even, self.row, blocks, found.noise, &mut pixels);
             let mut first = pixels[MIDDLE * BLOCK + MIDDLE];
             for other in pixels {
                 let takes = S::and_not(first.there.0, other.there.0);
@@ -873,8 +850,7 @@ impl Rows {
     }
 
     /// The pixels of so many blocks, at most one for each lane, whose first columns are these, in a `row` of blocks: lanes
-    /// without one take no window. Depths have this `noise`; pixels of the mask `exact` count alone. They are written in place,
-    /// as there are kilobytes.
+    /// without one take no window. Depths have this `noise`. They are written in place, as there are kilobytes.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
@@ -884,7 +860,7 @@ impl Rows {
         even: &EvenWindows,
         row: usize,
         (columns, blocks): (&[usize; LANES], usize),
-        (noise, exact): (Floats<S>, S::F),
+        noise: Floats<S>,
         pixels: &'p mut MaybeUninit<[Pixels<S>; BLOCK * BLOCK]>,
     ) -> &'p [Pixels<S>; BLOCK * BLOCK] {
         let &EvenWindows { cloud, options, .. } = even;
@@ -894,6 +870,8 @@ impl Rows {
         unsafe {
             let there = S::mask((1 << blocks) - 1);
             let none = S::splat(f32::NAN);
+            // Without noise each counts alone.
+            let counts_alone = S::mask(if even.asked.noise.is_none { all(S::LANES) } else { 0 });
             let noise = Floats::splat(NEAR_NOISE) * noise;
             let of_mean = noise * Floats::splat(even.asked.noise_share());
             let to = pixels.as_mut_ptr().cast::<Pixels<S>>();
@@ -908,7 +886,7 @@ impl Rows {
                 for column in 0..BLOCK {
                     let depth = S::select(there, depths[column], none);
                     let (inverse_depth, mean) = (Floats(inverse_depths[column]), means[column]);
-                    let has_mean = S::and_not(exact, S::eq(mean, mean));
+                    let has_mean = S::and_not(counts_alone, S::eq(mean, mean));
                     let near = Near {
                         inverse_depth: Floats(S::select(has_mean, mean, inverse_depth.0)),
                         noise: Floats(S::select(has_mean, of_mean.0, noise.0)),

@@ -14,8 +14,8 @@ use crate::fast::sink::Sink;
 use crate::fast::tile::{Bits, all};
 use crate::paper::{
     Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_LINES, JAGGED_POINTS, JAGGED_RADIUS,
-    MIDDLE, Plane, RELIEF, RELIEF_RADIUS, ROUNDING, estimate_in_space, estimate_of, even_window,
-    middle,
+    MIDDLE, Noise, Plane, RELIEF, RELIEF_RADIUS, ROUNDING, estimate_in_space, estimate_of,
+    even_window, middle,
 };
 use crate::simd::{GROUP, Groups};
 use crate::vector::dot;
@@ -120,16 +120,19 @@ impl<S: Groups> Fits<S> {
         self.turned = self.turned & !lanes | others.turned & lanes;
     }
 
-    /// The variance that the unevenness may be of, where `area` pixels have the same noise.
+    /// The variance that the unevenness may be of.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn noise(&self, area: f32) -> Doubles<S> {
+    unsafe fn noise(&self, of_image: &Noise) -> Doubles<S> {
         // SAFETY: as the caller's.
         unsafe {
+            if of_image.is_none {
+                return Doubles::splat(0.0);
+            }
             let left = self.points.narrow() - Floats::splat(3.0);
-            self.unevenness * above_chance(left, area).widen()
+            self.unevenness * above_chance(left, of_image.area).widen()
         }
     }
 
@@ -185,7 +188,7 @@ impl<S: Groups> Fits<S> {
         radii: Floats<S>,
         bend2: Floats<S>,
         (there, asked): (u32, u32),
-        area: f32,
+        noise: &Noise,
         windows: &mut [EvenWindow],
     ) {
         const { assert!(size_of::<EvenWindow>() == size_of::<[f32; 12]>()) };
@@ -196,12 +199,12 @@ impl<S: Groups> Fits<S> {
             // As `even_window` has it.
             let (one, points) = (Floats::splat(1.0), self.points.narrow());
             let side = Floats::splat(2.0) * radii + one;
-            let per_noise = Floats::splat(12.0 * area) / points / (side * side);
+            let per_noise = Floats::splat(12.0 * noise.area) / points / (side * side);
             let steepness = self.steepness_squared.narrow().sqrt();
             let fours = [
                 [radii, a.narrow(), b.narrow(), c.narrow()],
                 [x.narrow(), y.narrow(), z.narrow(), steepness],
-                [self.unevenness.narrow(), self.noise(area).narrow(), per_noise, bend2],
+                [self.unevenness.narrow(), self.noise(noise).narrow(), per_noise, bend2],
             ];
             let to = found.as_mut_ptr().cast::<f32>();
             for (fields, place) in fours.into_iter().zip((0..).step_by(4)) {
@@ -365,8 +368,8 @@ impl EvenTile<'_> {
             let largest = S::min((wanted + wanted).0, S::min(limit.0, clean.0));
             let largest = Floats(S::and(S::mask(asked), largest));
             let (zero, one) = (Floats::<S>::splat(0.0), Floats::<S>::splat(1.0));
-            let least = Doubles::splat(f64::from(of_image.least_noise));
-            let area = of_image.noise_area;
+            let least = Doubles::splat(f64::from(of_image.noise.least));
+            let area = of_image.noise.area;
             let smallest = Floats::splat(JAGGED_RADIUS as f32 - 1.0);
             // On steep surfaces, windows with depth changes; then, or else, windows without, and smaller ones while those
             // are much more even.
@@ -394,7 +397,7 @@ impl EvenTile<'_> {
                     hidden |= fits.hidden & todo;
                 }
                 let is_jagged = jagged & fits.there & self.jagged(&fits, &pixels, radii, y);
-                let mut is_enough = best.unevenness.lt(fits.noise(area).max(least));
+                let mut is_enough = best.unevenness.lt(fits.noise(&of_image.noise).max(least));
                 // Mostly none is.
                 if compared != 0 {
                     let in_relief = compared & fits.are_finer(&best, least, area);
@@ -428,7 +431,7 @@ impl EvenTile<'_> {
                 windows[lane].radius = WAITS;
             }
             let (there, asked) = (zero.lt(found), asked & !hidden);
-            best.write_windows(found, bend2, (there, asked), area, windows);
+            best.write_windows(found, bend2, (there, asked), &of_image.noise, windows);
             best.write_estimates(jagged_found & asked, of_image.has_curvature, asked, estimates);
             // What rounding could decide is left to the plain form.
             for lane in Bits(asked & doubtful) {
@@ -494,7 +497,7 @@ impl EvenTile<'_> {
             let angle2 = Doubles::splat(12.0) / (n - Doubles::splat(1.0)) * spread2.sqrt();
             let mut unevenness = deviation2 / depth2;
             // What the errors do to the sum of (1 - q P)^2, and to what tells lines and depths.
-            let least = Doubles::splat(self.even.asked.least_noise.into());
+            let least = Doubles::splat(self.even.asked.noise.least.into());
             // The determinant loses where points are far apart along a line.
             let of_determinant = Doubles::splat(ROUNDING) * trace * trace * trace * scale * n;
             let of_deviation = Doubles::splat(2.0 * error) * q2 + of_determinant;
@@ -558,7 +561,7 @@ impl EvenTile<'_> {
             jagged.take(most.lt(jagged), most);
             let steep = jagged * jagged * fits.steepness_squared;
             let fewest = Doubles::splat(JAGGED_POINTS) * (across * down).widen();
-            let least = Doubles::splat(self.even.asked.least_noise.into());
+            let least = Doubles::splat(self.even.asked.noise.least.into());
             !steep.lt(fits.unevenness) & !steep.lt(least) & !fits.points.lt(fewest)
         }
     }
