@@ -386,8 +386,8 @@ pub struct Normals<'a> {
     normal: [*mut f32; 3],
     grid: Grid,
     curvature: Option<(*mut f32, Grid)>,
-    /// If all fields lie within eight floats, nx, ny and nz side by side: how many floats after nx the curvature is, 3 to
-    /// 7, or 0 if it is not wanted.
+    /// If nx, ny and nz lie side by side: how many floats after nx the curvature is, 3 to 7, or 0 if it is elsewhere or not
+    /// wanted.
     side_by_side: Option<usize>,
     /// The level of the cache that lines are asked for to.
     level: Level,
@@ -457,13 +457,11 @@ impl<'a> Normals<'a> {
         curvature: Option<(*mut f32, Grid)>,
     ) -> Result<Self, Error> {
         let [nx, ny, nz] = normal;
-        let place = match curvature {
-            Some((field, other)) => {
-                (3..GROUP).find(|place| field == nx.wrapping_add(*place) && other == grid)
-            }
-            None => Some(0),
-        };
-        let side_by_side = place.filter(|_| ny == nx.wrapping_add(1) && nz == nx.wrapping_add(2));
+        let place = curvature.and_then(|(field, other)| {
+            (3..GROUP).find(|place| field == nx.wrapping_add(*place) && other == grid)
+        });
+        let are_side_by_side = ny == nx.wrapping_add(1) && nz == nx.wrapping_add(2);
+        let side_by_side = are_side_by_side.then_some(place.unwrap_or(0));
         let (level, lifetime) = (Level::best(), PhantomData);
         let normals = Normals { normal, grid, curvature, side_by_side, level, lifetime };
         let fields = normals.fields();
@@ -573,16 +571,38 @@ impl Normals<'_> {
         unsafe {
             if let Some(place) = self.side_by_side {
                 let nx = self.normal[0].byte_add(self.grid.offset(x, y));
-                return S::store_points(fields, place, nx, self.grid.point_stride);
+                S::store_points(fields, place, nx, self.grid.point_stride);
+                if place > 0 {
+                    return;
+                }
+            } else {
+                for (to, field) in self.normal.into_iter().zip(fields) {
+                    write_field::<S>(to, &self.grid, (x, y), field);
+                }
             }
-            let mut lanes = [[0.0; 2 * GROUP]; 4];
-            for (to, field) in lanes.iter_mut().zip(fields) {
-                S::store(to.as_mut_ptr(), field);
+            if let Some((to, grid)) = &self.curvature {
+                write_field::<S>(*to, grid, (x, y), fields[3]);
             }
-            let [nx, ny, nz, curvature] = lanes;
-            for lane in 0..S::LANES {
-                self.write(x + lane, y, [nx[lane], ny[lane], nz[lane]], curvature[lane]);
-            }
+        }
+    }
+}
+
+/// Writes one field of as many pixels of a row as there are lanes.
+///
+/// # Safety
+/// As [`Normals::write_lanes`]; the field is on this grid.
+#[inline(always)]
+unsafe fn write_field<S: Simd>(to: *mut f32, grid: &Grid, (x, y): (usize, usize), field: S::F) {
+    // SAFETY: as the caller's.
+    unsafe {
+        let first = to.byte_add(grid.offset(x, y));
+        if grid.point_stride == FIELD {
+            return S::store(first, field);
+        }
+        let mut lanes = [0.0; 2 * GROUP];
+        S::store(lanes.as_mut_ptr(), field);
+        for (lane, value) in lanes[..S::LANES].iter().enumerate() {
+            first.byte_add(lane * grid.point_stride).write(*value);
         }
     }
 }

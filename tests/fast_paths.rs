@@ -774,6 +774,49 @@ fn points_and_normals_may_share_an_array() {
     }
 }
 
+/// Normals as three planes, or side by side, and curvatures as one; rows packed and padded.
+#[test]
+fn normals_and_curvatures_may_be_planes() {
+    let (width, height) = (67, 29);
+    let cloud = Cloud::new(Kind::NanPixels, width, height, 7);
+    for method in methods() {
+        let options = options(method, 7.0, false);
+        for isa in fast_isas().chain([Isa::Scalar]) {
+            let mut estimator = Estimator::with_isa(options.clone(), isa);
+            let fields = compute(&mut estimator, &cloud);
+            for (stride, padding, has_curvature) in
+                [(1, 0, true), (1, 5, true), (1, 5, false), (3, 0, true), (3, 5, true)]
+            {
+                let row = width + padding;
+                let plane = row * height;
+                // Floats from nx to ny, and from a row of normals to the next.
+                let (step, normal_row) = if stride == 1 { (plane, row) } else { (1, stride * row) };
+                let mut expected = vec![CANARY; 4 * plane];
+                for (at, fields) in fields.iter().enumerate() {
+                    let (x, y) = (at % width, at / width);
+                    for c in 0..3 {
+                        expected[y * normal_row + x * stride + c * step] = fields[c];
+                    }
+                    if has_curvature {
+                        expected[3 * plane + y * row + x] = fields[3];
+                    }
+                }
+                let mut data = vec![CANARY; 4 * plane];
+                let base = data.as_mut_ptr();
+                let to = [0, 1, 2].map(|c| base.wrapping_add(c * step));
+                let strides = [4 * stride, 4 * normal_row];
+                let curvature = has_curvature.then(|| (base.wrapping_add(3 * plane), [4, 4 * row]));
+                // SAFETY: the array outlives the view and is not touched but through it meanwhile; the fields are inside it.
+                let normals = unsafe { Normals::from_raw(to, width, height, strides, curvature) };
+                estimator.compute(&cloud.view(), &mut normals.unwrap()).unwrap();
+                let bits = |data: Vec<f32>| data.into_iter().map(f32::to_bits).collect::<Vec<_>>();
+                let what = format!("{isa:?} stride {stride}, padding {padding}");
+                assert!(bits(data) == bits(expected), "{what}, curvature {has_curvature}");
+            }
+        }
+    }
+}
+
 /// A surface that is seen exactly edge-on keeps the side that the method gives, as in PCL: AVERAGE_DEPTH_CHANGE's is the other.
 #[test]
 fn edge_on_normals_are_not_turned() {
