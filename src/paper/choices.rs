@@ -191,7 +191,7 @@ impl<'a> Candidates<'a> {
                 found.windows.push(Candidate { place, window, middle, cost: f32::INFINITY });
             }
         });
-        found.noise = found.noise.max(asked.noise.floor);
+        found.noise = found.noise.max(asked.noise.least);
         for Candidate { window, cost, .. } in &mut found.windows {
             let misfit = (window.unevenness - found.noise).max(0.0);
             *cost = found.noise * window.per_noise + misfit * window.per_misfit();
@@ -326,7 +326,7 @@ impl<'a> Candidates<'a> {
         let mean = rect.x.clone().map(of_column).sum::<f32>() / NEXT;
         let is_clean = !asked.clean.spoilt.has((x, y));
         let is_whole = rect.area() as f32 == NEXT && !mean.is_nan();
-        let noise = NEAR_NOISE * self.noise;
+        let noise = NEAR_NOISE * if asked.noise.is_none { asked.noise.floor } else { self.noise };
         if is_whole && is_clean && !asked.noise.is_none {
             Near { inverse_depth: mean, noise: noise * asked.noise_share() }
         } else {

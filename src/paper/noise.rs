@@ -44,7 +44,8 @@ pub(crate) struct Noise {
     pub is_none: bool,
     /// The smallest variance of inverse depths that is told from none.
     pub least: f32,
-    /// The smallest that depths may have beside a plane that is theirs: the same, or less where there is no noise.
+    /// The squared distance of a pixel's inverse depth from its window's plane that is told from none: the same, or less where
+    /// there is no noise.
     pub floor: f32,
     /// How many pixels have the same noise: n points tell of a plane as much as that many times fewer with noise of their own.
     /// 1 if each pixel has its own.

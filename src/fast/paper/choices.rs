@@ -16,7 +16,8 @@ use crate::memory::{bytes, make_room, refill, resize};
 use crate::options::{Options, Semantics};
 use crate::paper::{
     ALIKE, BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EvenWindow, EvenWindows, JITTER,
-    MIDDLE, MISFIT, NEAR_NOISE, NEXT, NO_WINDOW, REACH, inverse_depth, marks_from, places_at,
+    MIDDLE, MISFIT, NEAR_NOISE, NEXT, NO_WINDOW, Noise, REACH, inverse_depth, marks_from,
+    places_at,
 };
 use crate::simd::{Along, Groups, Simd, load_by_fours};
 use crate::vector::dot;
@@ -34,8 +35,8 @@ pub(super) unsafe fn rows<S: Groups>(
     let Blocks { across, .. } = even.asked.blocks;
     let Scratch { concerned, rows: image_rows, candidates } = scratch;
     // SAFETY: as the caller's.
-    let floor = unsafe { Floats::<S::Widest>::splat(even.asked.noise.floor) };
-    let mut found = Found { candidates, number: 0, floor, noise: floor };
+    let least_noise = unsafe { Floats::<S::Widest>::splat(even.asked.noise.least) };
+    let mut found = Found { candidates, number: 0, least_noise, noise: least_noise };
     for (row, choices) in rows {
         choices.fill(NO_WINDOW);
         let levels = &even.levels[row * across..][..across];
@@ -321,8 +322,8 @@ struct Found<'a, S: Simd> {
     /// Only so many mean something.
     candidates: &'a mut [Candidates],
     number: usize,
-    /// The smallest variance that depths may have, and the least among the windows.
-    floor: Floats<S>,
+    /// The least variance that is told from none, and the least among the windows.
+    least_noise: Floats<S>,
     noise: Floats<S>,
 }
 
@@ -415,7 +416,7 @@ impl<S: Along> Found<'_, S> {
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn weigh(&mut self) {
-        self.noise = self.noise.max(self.floor);
+        self.noise = self.noise.max(self.least_noise);
         for to in &mut self.candidates[..self.number] {
             // SAFETY: as the caller's.
             unsafe {
@@ -872,6 +873,8 @@ impl Rows {
             let none = S::splat(f32::NAN);
             // Without noise each counts alone.
             let counts_alone = S::mask(if even.asked.noise.is_none { all(S::LANES) } else { 0 });
+            let Noise { is_none, floor, .. } = even.asked.noise;
+            let noise = if is_none { Floats::splat(floor) } else { noise };
             let noise = Floats::splat(NEAR_NOISE) * noise;
             let of_mean = noise * Floats::splat(even.asked.noise_share());
             let to = pixels.as_mut_ptr().cast::<Pixels<S>>();
