@@ -633,50 +633,60 @@ fn laid_out(cloud: &Cloud, stride: usize, row: usize) -> Vec<f32> {
     data
 }
 
+/// Calls `check` with an estimator of each instruction set, the scalar one too, for all options, and with what it makes of the
+/// cloud.
+fn for_each_isa(
+    cloud: &Cloud,
+    all: impl Iterator<Item = Options>,
+    mut check: impl FnMut(Isa, &mut Estimator, &[[f32; 4]]),
+) {
+    for options in all {
+        for isa in fast_isas().chain([Isa::Scalar]) {
+            let mut estimator = Estimator::with_isa(options.clone(), isa);
+            let expected = compute(&mut estimator, cloud);
+            check(isa, &mut estimator, &expected);
+        }
+    }
+}
+
 #[test]
 fn layouts_of_points_do_not_matter() {
     for (width, height) in [(67, 29), (16, 9), (3, 3)] {
         let cloud = Cloud::new(Kind::NanBlocks, width, height, 5);
         let all = methods().map(|method| options(method, 5.0, true)).chain(paper_options());
-        for options in all {
-            for isa in fast_isas().chain([Isa::Scalar]) {
-                let mut estimator = Estimator::with_isa(options.clone(), isa);
-                let expected = compute(&mut estimator, &cloud);
-                let mut check = |points: &Points, what: &str| {
-                    let mut found = vec![[7.0; 4]; width * height];
-                    let data = found.as_flattened_mut();
-                    let mut normals =
-                        Normals::interleaved(data, width, height, 4, 0, Some(3)).unwrap();
-                    estimator.compute(points, &mut normals).unwrap();
-                    assert_same_bits(&found, &expected, width, &format!("{isa:?} {what}"));
-                };
-                for stride in [3, 4, 5, 8] {
-                    for padding in [0, 1, 7] {
-                        let row = width * stride + padding;
-                        let data = laid_out(&cloud, stride, row);
-                        // Not one float more than needed: the last point ends the buffer.
-                        let end = data.len() - padding - (stride - 3);
-                        let data = data[..end].to_vec().into_boxed_slice();
-                        let points =
-                            Points::interleaved(&data, width, height, stride, row).unwrap();
-                        check(&points, &format!("stride {stride}, padding {padding}"));
-                    }
-                }
-                for padding in [0, 3] {
-                    let row = width + padding;
-                    let planes = [0, 1, 2].map(|c| {
-                        let mut plane = vec![f32::NAN; row * height - padding];
-                        for (at, point) in cloud.points.iter().enumerate() {
-                            plane[at / width * row + at % width] = point[c];
-                        }
-                        plane
-                    });
-                    let [x, y, z] = &planes;
-                    let points = Points::planes([x, y, z], width, height, row).unwrap();
-                    check(&points, &format!("planes, padding {padding}"));
+        for_each_isa(&cloud, all, |isa, estimator, expected| {
+            let mut check = |points: &Points, what: &str| {
+                let mut found = vec![[7.0; 4]; width * height];
+                let data = found.as_flattened_mut();
+                let mut normals = Normals::interleaved(data, width, height, 4, 0, Some(3)).unwrap();
+                estimator.compute(points, &mut normals).unwrap();
+                assert_same_bits(&found, expected, width, &format!("{isa:?} {what}"));
+            };
+            for stride in [3, 4, 5, 8] {
+                for padding in [0, 1, 7] {
+                    let row = width * stride + padding;
+                    let data = laid_out(&cloud, stride, row);
+                    // Not one float more than needed: the last point ends the buffer.
+                    let end = data.len() - padding - (stride - 3);
+                    let data = data[..end].to_vec().into_boxed_slice();
+                    let points = Points::interleaved(&data, width, height, stride, row).unwrap();
+                    check(&points, &format!("stride {stride}, padding {padding}"));
                 }
             }
-        }
+            for padding in [0, 3] {
+                let row = width + padding;
+                let planes = [0, 1, 2].map(|c| {
+                    let mut plane = vec![f32::NAN; row * height - padding];
+                    for (at, point) in cloud.points.iter().enumerate() {
+                        plane[at / width * row + at % width] = point[c];
+                    }
+                    plane
+                });
+                let [x, y, z] = &planes;
+                let points = Points::planes([x, y, z], width, height, row).unwrap();
+                check(&points, &format!("planes, padding {padding}"));
+            }
+        });
     }
 }
 
@@ -684,40 +694,36 @@ fn layouts_of_points_do_not_matter() {
 fn other_bytes_of_the_output_stay() {
     for (width, height) in [(67, 29), (16, 9), (3, 3)] {
         let cloud = Cloud::new(Kind::NanBlocks, width, height, 6);
-        for method in methods() {
-            let options = options(method, 5.0, false);
-            for isa in fast_isas().chain([Isa::Scalar]) {
-                let mut estimator = Estimator::with_isa(options.clone(), isa);
-                let expected = compute(&mut estimator, &cloud);
-                for (stride, curvature) in
-                    [(3, None), (4, None), (4, Some(3)), (5, Some(3)), (8, Some(4)), (8, None)]
-                {
-                    for padding in [0, 5] {
-                        let row = width * stride + padding;
-                        let mut data = vec![CANARY; row * height];
-                        let mut normals =
-                            Normals::interleaved(&mut data, width, height, stride, row, curvature)
-                                .unwrap();
-                        estimator.compute(&cloud.view(), &mut normals).unwrap();
-                        for (at, value) in data.into_iter().enumerate() {
-                            let (y, in_row) = (at / row, at % row);
-                            let (x, field) = (in_row / stride, in_row % stride);
-                            let expected = match field {
-                                _ if x >= width => CANARY,
-                                0..3 => expected[y * width + x][field],
-                                _ if Some(field) == curvature => expected[y * width + x][3],
-                                _ => CANARY,
-                            };
-                            assert_eq!(
-                                value.to_bits(),
-                                expected.to_bits(),
-                                "{isa:?} stride {stride}, padding {padding}, float {at}"
-                            );
-                        }
+        let all = methods().map(|method| options(method, 5.0, false));
+        for_each_isa(&cloud, all, |isa, estimator, expected| {
+            for (stride, curvature) in
+                [(3, None), (4, None), (4, Some(3)), (5, Some(3)), (8, Some(4)), (8, None)]
+            {
+                for padding in [0, 5] {
+                    let row = width * stride + padding;
+                    let mut data = vec![CANARY; row * height];
+                    let mut normals =
+                        Normals::interleaved(&mut data, width, height, stride, row, curvature)
+                            .unwrap();
+                    estimator.compute(&cloud.view(), &mut normals).unwrap();
+                    for (at, value) in data.into_iter().enumerate() {
+                        let (y, in_row) = (at / row, at % row);
+                        let (x, field) = (in_row / stride, in_row % stride);
+                        let expected = match field {
+                            _ if x >= width => CANARY,
+                            0..3 => expected[y * width + x][field],
+                            _ if Some(field) == curvature => expected[y * width + x][3],
+                            _ => CANARY,
+                        };
+                        assert_eq!(
+                            value.to_bits(),
+                            expected.to_bits(),
+                            "{isa:?} stride {stride}, padding {padding}, float {at}"
+                        );
                     }
                 }
             }
-        }
+        });
     }
 }
 
@@ -726,52 +732,47 @@ fn other_bytes_of_the_output_stay() {
 fn points_and_normals_may_share_an_array() {
     let (width, height) = (67, 29);
     let cloud = Cloud::new(Kind::NanPixels, width, height, 7);
-    for method in methods() {
-        let options = options(method, 7.0, false);
-        for isa in fast_isas().chain([Isa::Scalar]) {
-            let mut estimator = Estimator::with_isa(options.clone(), isa);
-            let expected = compute(&mut estimator, &cloud);
-            // Floats a point, first floats of the normal and the curvature, floats after a row.
-            for (stride, first, curvature, padding) in
-                [(12, 4, 8, 0), (7, 3, 6, 0), (8, 3, 7, 2), (9, 6, 3, 4)]
-            {
-                let row = width * stride + padding;
-                let mut data = laid_out(&cloud, stride, row);
-                let before = data.clone();
-                let base = data.as_mut_ptr();
-                let place = |field: usize| base.wrapping_add(field);
-                let strides = [4 * stride, 4 * row];
-                // SAFETY: the array outlives both views and is not touched but through them meanwhile; their
-                // fields are inside it, and disjoint.
-                unsafe {
-                    let from = [0, 1, 2].map(|c| place(c).cast_const());
-                    let points = Points::from_raw(from, width, height, strides).unwrap();
-                    let to = [0, 1, 2].map(|c| place(first + c));
-                    let curvature = Some((place(curvature), strides));
-                    let mut normals =
-                        Normals::from_raw(to, width, height, strides, curvature).unwrap();
-                    estimator.compute(&points, &mut normals).unwrap();
-                }
-                for (at, (value, before)) in data.into_iter().zip(before).enumerate() {
-                    let (y, in_row) = (at / row, at % row);
-                    let (x, field) = (in_row / stride, in_row % stride);
-                    let expected = match field {
-                        _ if x >= width => before,
-                        _ if (first..first + 3).contains(&field) => {
-                            expected[y * width + x][field - first]
-                        }
-                        _ if field == curvature => expected[y * width + x][3],
-                        _ => before,
-                    };
-                    assert_eq!(
-                        value.to_bits(),
-                        expected.to_bits(),
-                        "{isa:?} stride {stride}, float {at}"
-                    );
-                }
+    let all = methods().map(|method| options(method, 7.0, false));
+    for_each_isa(&cloud, all, |isa, estimator, expected| {
+        // Floats a point, first floats of the normal and the curvature, floats after a row.
+        for (stride, first, curvature, padding) in
+            [(12, 4, 8, 0), (7, 3, 6, 0), (8, 3, 7, 2), (9, 6, 3, 4)]
+        {
+            let row = width * stride + padding;
+            let mut data = laid_out(&cloud, stride, row);
+            let before = data.clone();
+            let base = data.as_mut_ptr();
+            let place = |field: usize| base.wrapping_add(field);
+            let strides = [4 * stride, 4 * row];
+            // SAFETY: the array outlives both views and is not touched but through them meanwhile; their
+            // fields are inside it, and disjoint.
+            unsafe {
+                let from = [0, 1, 2].map(|c| place(c).cast_const());
+                let points = Points::from_raw(from, width, height, strides).unwrap();
+                let to = [0, 1, 2].map(|c| place(first + c));
+                let curvature = Some((place(curvature), strides));
+                let mut normals = Normals::from_raw(to, width, height, strides, curvature).unwrap();
+                estimator.compute(&points, &mut normals).unwrap();
+            }
+            for (at, (value, before)) in data.into_iter().zip(before).enumerate() {
+                let (y, in_row) = (at / row, at % row);
+                let (x, field) = (in_row / stride, in_row % stride);
+                let expected = match field {
+                    _ if x >= width => before,
+                    _ if (first..first + 3).contains(&field) => {
+                        expected[y * width + x][field - first]
+                    }
+                    _ if field == curvature => expected[y * width + x][3],
+                    _ => before,
+                };
+                assert_eq!(
+                    value.to_bits(),
+                    expected.to_bits(),
+                    "{isa:?} stride {stride}, float {at}"
+                );
             }
         }
-    }
+    });
 }
 
 /// Normals as three planes, or side by side, and curvatures as one; rows packed and padded.
@@ -779,42 +780,38 @@ fn points_and_normals_may_share_an_array() {
 fn normals_and_curvatures_may_be_planes() {
     let (width, height) = (67, 29);
     let cloud = Cloud::new(Kind::NanPixels, width, height, 7);
-    for method in methods() {
-        let options = options(method, 7.0, false);
-        for isa in fast_isas().chain([Isa::Scalar]) {
-            let mut estimator = Estimator::with_isa(options.clone(), isa);
-            let fields = compute(&mut estimator, &cloud);
-            for (stride, padding, has_curvature) in
-                [(1, 0, true), (1, 5, true), (1, 5, false), (3, 0, true), (3, 5, true)]
-            {
-                let row = width + padding;
-                let plane = row * height;
-                // Floats from nx to ny, and from a row of normals to the next.
-                let (step, normal_row) = if stride == 1 { (plane, row) } else { (1, stride * row) };
-                let mut expected = vec![CANARY; 4 * plane];
-                for (at, fields) in fields.iter().enumerate() {
-                    let (x, y) = (at % width, at / width);
-                    for c in 0..3 {
-                        expected[y * normal_row + x * stride + c * step] = fields[c];
-                    }
-                    if has_curvature {
-                        expected[3 * plane + y * row + x] = fields[3];
-                    }
+    let all = methods().map(|method| options(method, 7.0, false));
+    for_each_isa(&cloud, all, |isa, estimator, fields| {
+        for (stride, padding, has_curvature) in
+            [(1, 0, true), (1, 5, true), (1, 5, false), (3, 0, true), (3, 5, true)]
+        {
+            let row = width + padding;
+            let plane = row * height;
+            // Floats from nx to ny, and from a row of normals to the next.
+            let (step, normal_row) = if stride == 1 { (plane, row) } else { (1, stride * row) };
+            let mut expected = vec![CANARY; 4 * plane];
+            for (at, fields) in fields.iter().enumerate() {
+                let (x, y) = (at % width, at / width);
+                for c in 0..3 {
+                    expected[y * normal_row + x * stride + c * step] = fields[c];
                 }
-                let mut data = vec![CANARY; 4 * plane];
-                let base = data.as_mut_ptr();
-                let to = [0, 1, 2].map(|c| base.wrapping_add(c * step));
-                let strides = [4 * stride, 4 * normal_row];
-                let curvature = has_curvature.then(|| (base.wrapping_add(3 * plane), [4, 4 * row]));
-                // SAFETY: the array outlives the view and is not touched but through it meanwhile; the fields are inside it.
-                let normals = unsafe { Normals::from_raw(to, width, height, strides, curvature) };
-                estimator.compute(&cloud.view(), &mut normals.unwrap()).unwrap();
-                let bits = |data: Vec<f32>| data.into_iter().map(f32::to_bits).collect::<Vec<_>>();
-                let what = format!("{isa:?} stride {stride}, padding {padding}");
-                assert!(bits(data) == bits(expected), "{what}, curvature {has_curvature}");
+                if has_curvature {
+                    expected[3 * plane + y * row + x] = fields[3];
+                }
             }
+            let mut data = vec![CANARY; 4 * plane];
+            let base = data.as_mut_ptr();
+            let to = [0, 1, 2].map(|c| base.wrapping_add(c * step));
+            let strides = [4 * stride, 4 * normal_row];
+            let curvature = has_curvature.then(|| (base.wrapping_add(3 * plane), [4, 4 * row]));
+            // SAFETY: the array outlives the view and is not touched but through it meanwhile; the fields are inside it.
+            let normals = unsafe { Normals::from_raw(to, width, height, strides, curvature) };
+            estimator.compute(&cloud.view(), &mut normals.unwrap()).unwrap();
+            let bits = |data: Vec<f32>| data.into_iter().map(f32::to_bits).collect::<Vec<_>>();
+            let what = format!("{isa:?} stride {stride}, padding {padding}");
+            assert!(bits(data) == bits(expected), "{what}, curvature {has_curvature}");
         }
-    }
+    });
 }
 
 /// A surface that is seen exactly edge-on keeps the side that the method gives, as in PCL: AVERAGE_DEPTH_CHANGE's is the other.

@@ -326,7 +326,7 @@ impl<'a> Candidates<'a> {
         let mean = rect.x.clone().map(of_column).sum::<f32>() / NEXT;
         let is_clean = !asked.clean.spoilt.has((x, y));
         let is_whole = rect.area() as f32 == NEXT && !mean.is_nan();
-        let noise = NEAR_NOISE * if asked.noise.is_none { asked.noise.floor } else { self.noise };
+        let noise = NEAR_NOISE * asked.noise.of_exact().unwrap_or(self.noise);
         if is_whole && is_clean && !asked.noise.is_none {
             Near { inverse_depth: mean, noise: noise * asked.noise_share() }
         } else {

@@ -16,8 +16,7 @@ use crate::memory::{bytes, make_room, refill, resize};
 use crate::options::{Options, Semantics};
 use crate::paper::{
     ALIKE, BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EvenWindow, EvenWindows, JITTER,
-    MIDDLE, MISFIT, NEAR_NOISE, NEXT, NO_WINDOW, Noise, REACH, inverse_depth, marks_from,
-    places_at,
+    MIDDLE, MISFIT, NEAR_NOISE, NEXT, NO_WINDOW, REACH, inverse_depth, marks_from, places_at,
 };
 use crate::simd::{Along, Groups, Simd, load_by_fours};
 use crate::vector::dot;
@@ -873,8 +872,10 @@ impl Rows {
             let none = S::splat(f32::NAN);
             // Without noise each counts alone.
             let counts_alone = S::mask(if even.asked.noise.is_none { all(S::LANES) } else { 0 });
-            let Noise { is_none, floor, .. } = even.asked.noise;
-            let noise = if is_none { Floats::splat(floor) } else { noise };
+            let noise = match even.asked.noise.of_exact() {
+                Some(noise) => Floats::splat(noise),
+                None => noise,
+            };
             let noise = Floats::splat(NEAR_NOISE) * noise;
             let of_mean = noise * Floats::splat(even.asked.noise_share());
             let to = pixels.as_mut_ptr().cast::<Pixels<S>>();
