@@ -181,9 +181,9 @@ fn crease_windows_leave_flat_parts_of_real_frames_smooth() {
     for (name, times) in [
         ("office1", 1.2),
         ("kinect_capture0001", 0.75),
-        ("table_scene_mug_stereo_textured", 0.6),
+        ("table_scene_mug_stereo_textured", 0.5),
         ("milk_cartoon_all_small_clorox", 0.4),
-        ("realsense_d435", 0.65),
+        ("realsense_d435", 0.57),
     ] {
         let Some(frame) = real_frame(test, name) else { continue };
         let [single, second] = [false, true].map(|creases| {

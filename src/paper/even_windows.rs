@@ -18,6 +18,10 @@ use crate::rect::Rect;
 /// standard deviations of a sample's variance above that of the window of half its radius; and the noise's variance is
 /// taken to be as far above the least one of all windows that a pixel can take.
 pub(crate) const CHANCE: f32 = 3.0;
+/// A plane takes as much of the noise's variance as three points have, or three areas if neighbours share it. Of the window of half
+/// its radius that counts up to this share of the points: with less, small windows, which follow such noise, pass for better ones;
+/// with more, creases in it pass for noise.
+pub(crate) const TAKEN: f32 = 0.2;
 /// Relief finer than windows, as stairs far away, makes one hardly less even than that of half its radius. If its variance is
 /// above this many times the least that is told from none (half of alpha squared), and half its radius is this large, it must be
 /// as even as the window of a quarter of its radius too.
@@ -137,20 +141,23 @@ fn find_even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<(EvenW
     };
     let radii = std::iter::successors(Some(wanted), |radius| Some(radius * 7 / 10));
     let mut radii = radii.take_while(|radius| *radius > clean && *radius >= JAGGED_RADIUS);
-    // The plane takes as much of the noise's variance as so many points have.
-    let noise_beyond = |plane: &Plane, taken: f32| {
+    // The variance that a window's unevenness may be of, where its plane takes as much as so many points have.
+    let noise = |plane: &Plane, taken: f32| {
+        if asked.noise.is_none {
+            return 0.0;
+        }
         let (told, left) = (plane.points as f32 - 3.0, plane.points as f32 - taken);
         let chance = (2.0 * asked.noise.area / left).sqrt();
         plane.unevenness * f64::from(told / left * (1.0 + CHANCE * chance))
     };
-    let noise = |plane: &Plane| if asked.noise.is_none { 0.0 } else { noise_beyond(plane, 3.0) };
+    let areas = 3.0 * asked.noise.area;
+    let taken_of = |half: &Plane| areas.min(TAKEN * half.points as f32).max(3.0);
     let least_noise = f64::from(asked.noise.least);
     let in_relief = |found: &Plane, radius: u32| {
         let is_rough = radius / 2 >= RELIEF_RADIUS && RELIEF * least_noise < found.unevenness;
         let quarter = is_rough.then(|| plane(radius / 4))??;
-        let taken = 3.0 * asked.noise.area;
-        let is_even = || found.unevenness < noise_beyond(&quarter, taken).max(least_noise);
-        (taken < quarter.points as f32 && !is_even()).then_some(quarter)
+        let is_even = || found.unevenness < noise(&quarter, areas).max(least_noise);
+        (areas < quarter.points as f32 && !is_even()).then_some(quarter)
     };
     let found = radii.find_map(jagged);
     let is_jagged = found.is_some();
@@ -160,7 +167,7 @@ fn find_even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<(EvenW
         while radius > 1
             && let Some(half) = plane(radius / 2)
         {
-            if found.unevenness < noise(&half).max(least_noise) {
+            if found.unevenness < noise(&half, taken_of(&half)).max(least_noise) {
                 if let Some(quarter) = in_relief(&found, radius) {
                     (radius, found) = (radius / 4, quarter);
                     continue;
@@ -183,7 +190,7 @@ fn find_even_window(cloud: &Cloud, asked: &Asked, block: usize) -> Option<(EvenW
         ray: plane.ray.map(|ray| ray as f32),
         steepness: plane.steepness_squared.sqrt() as f32,
         unevenness: plane.unevenness as f32,
-        noise: noise(&plane) as f32,
+        noise: noise(&plane, 3.0) as f32,
         per_noise: 12.0 * asked.noise.area / points / (side * side),
         bend2: bend2 as f32,
     };

@@ -30,7 +30,7 @@ pub(crate) use cloud::{Cleaned, Cloud};
 pub(crate) use depth_change::{DepthChanges, between};
 pub(crate) use even_windows::{
     Asked, CHANCE, EvenWindow, JAGGED, JAGGED_LINES, JAGGED_POINTS, JAGGED_RADIUS, RELIEF,
-    RELIEF_RADIUS, estimate_of, even_window,
+    RELIEF_RADIUS, TAKEN, estimate_of, even_window,
 };
 pub(crate) use marks::{Marks, WORD, columns as columns_of, from as marks_from, mark, word_of};
 pub(crate) use methods::estimate as plain_estimate;

@@ -14,7 +14,7 @@ use crate::fast::sink::Sink;
 use crate::fast::tile::{Bits, all};
 use crate::paper::{
     Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_LINES, JAGGED_POINTS, JAGGED_RADIUS,
-    MIDDLE, Noise, Plane, RELIEF, RELIEF_RADIUS, ROUNDING, estimate_in_space, estimate_of,
+    MIDDLE, Noise, Plane, RELIEF, RELIEF_RADIUS, ROUNDING, TAKEN, estimate_in_space, estimate_of,
     even_window, middle,
 };
 use crate::simd::{GROUP, Groups};
@@ -120,19 +120,34 @@ impl<S: Groups> Fits<S> {
         self.turned = self.turned & !lanes | others.turned & lanes;
     }
 
-    /// The variance that the unevenness may be of.
+    /// The variance that the unevenness may be of, where planes take as much as so many points have.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn noise(&self, of_image: &Noise) -> Doubles<S> {
+    unsafe fn noise(&self, of_image: &Noise, taken: Floats<S>) -> Doubles<S> {
         // SAFETY: as the caller's.
         unsafe {
             if of_image.is_none {
                 return Doubles::splat(0.0);
             }
-            let left = self.points.narrow() - Floats::splat(3.0);
-            self.unevenness * above_chance(left, of_image.area).widen()
+            let points = self.points.narrow();
+            let (told, left) = (points - Floats::splat(3.0), points - taken);
+            self.unevenness * (told / left * above_chance(left, of_image.area)).widen()
+        }
+    }
+
+    /// The same where others have twice the radii.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn noise_of_half(&self, of_image: &Noise) -> Doubles<S> {
+        // SAFETY: as the caller's.
+        unsafe {
+            let most = Floats::splat(TAKEN) * self.points.narrow();
+            let taken = Floats(S::min(S::splat(3.0 * of_image.area), most.0));
+            self.noise(of_image, taken.max(Floats::splat(3.0)))
         }
     }
 
@@ -141,15 +156,12 @@ impl<S: Groups> Fits<S> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn are_finer(&self, others: &Self, least: Doubles<S>, area: f32) -> u32 {
+    unsafe fn are_finer(&self, others: &Self, least: Doubles<S>, of_image: &Noise) -> u32 {
         // SAFETY: as the caller's.
         unsafe {
-            // As `even_window` has it.
-            let (points, taken) = (self.points.narrow(), Floats::splat(3.0 * area));
-            let (told, left) = (points - Floats::splat(3.0), points - taken);
-            let noise = told / left * above_chance(left, area);
-            let noise = (self.unevenness * noise.widen()).max(least);
-            self.there & taken.lt(points) & !others.unevenness.lt(noise)
+            let taken = Floats::splat(3.0 * of_image.area);
+            let noise = self.noise(of_image, taken).max(least);
+            self.there & taken.lt(self.points.narrow()) & !others.unevenness.lt(noise)
         }
     }
 
@@ -204,7 +216,12 @@ impl<S: Groups> Fits<S> {
             let fours = [
                 [radii, a.narrow(), b.narrow(), c.narrow()],
                 [x.narrow(), y.narrow(), z.narrow(), steepness],
-                [self.unevenness.narrow(), self.noise(noise).narrow(), per_noise, bend2],
+                [
+                    self.unevenness.narrow(),
+                    self.noise(noise, Floats::splat(3.0)).narrow(),
+                    per_noise,
+                    bend2,
+                ],
             ];
             let to = found.as_mut_ptr().cast::<f32>();
             for (fields, place) in fours.into_iter().zip((0..).step_by(4)) {
@@ -397,10 +414,11 @@ impl EvenTile<'_> {
                     hidden |= fits.hidden & todo;
                 }
                 let is_jagged = jagged & fits.there & self.jagged(&fits, &pixels, radii, y);
-                let mut is_enough = best.unevenness.lt(fits.noise(&of_image.noise).max(least));
+                let mut is_enough =
+                    best.unevenness.lt(fits.noise_of_half(&of_image.noise).max(least));
                 // Mostly none is.
                 if compared != 0 {
-                    let in_relief = compared & fits.are_finer(&best, least, area);
+                    let in_relief = compared & fits.are_finer(&best, least, &of_image.noise);
                     is_enough = is_enough & !compared | compared & !in_relief;
                     bend2.take(S::mask(in_relief), zero);
                 }
