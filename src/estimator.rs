@@ -180,11 +180,9 @@ impl Estimator {
         normal.check_disjoint(points)?;
         let size = (width as usize, height as usize);
         // The paper's methods leave zeros out themselves.
-        let cleaned = match self.options.semantics {
-            Semantics::Pcl => self.without_zeros(points)?,
-            Semantics::Paper => None,
-        };
-        let cleaned = cleaned.as_ref().map(packed);
+        let is_cleaned = self.options.semantics == Semantics::Pcl && self.options.zero_is_missing;
+        let cleaned = is_cleaned.then(|| Cloud::new(points, &self.options)).transpose()?;
+        let cleaned = cleaned.as_ref().map(Cloud::view);
         let found = of_window(cleaned.as_ref().unwrap_or(points), &self.options, (x, y), size);
         let found = turn_to_viewpoint(found, points.at(x, y), self.options.viewpoint);
         write(normal, None, 1, &Workers::default(), |_, _| Some(found));
@@ -211,39 +209,9 @@ impl Estimator {
         {
             return Err(Error::Unsupported);
         }
-        let cleaned = self.without_zeros(points)?;
-        let cleaned = cleaned.as_ref().map(packed);
-        let points = cleaned.as_ref().unwrap_or(points);
-        let write = |map: &mut Option<&mut [f32]>, from: &[f32]| {
-            if let Some(map) = map {
-                map.copy_from_slice(from);
-            }
-        };
         let depth_changes = match self.options.semantics {
-            Semantics::Pcl => {
-                let plain = Plain::new(points, &self.options)?;
-                let eigenvalues = maps.eigenvalues.is_some().then(|| plain.eigenvalue_map());
-                let eigenvalues = eigenvalues.transpose()?;
-                write(&mut maps.distances, &plain.distances);
-                if let Some(map) = &mut maps.smoothing_areas {
-                    for (at, to) in map.iter_mut().enumerate() {
-                        *to = plain.window_side(at % width, at / width) as f32;
-                    }
-                }
-                write(&mut maps.eigenvalues, eigenvalues.unwrap_or_default().as_flattened());
-                plain.depth_changes
-            }
-            Semantics::Paper => {
-                let of_paper = PaperMaps::new(points, &self.options)?;
-                let eigenvalues =
-                    maps.eigenvalues.is_some().then(|| of_paper.eigenvalue_map(points));
-                let eigenvalues = eigenvalues.transpose()?;
-                write(&mut maps.depth_radii, &of_paper.depth_radii);
-                write(&mut maps.distances, &of_paper.distances);
-                write(&mut maps.smoothing_areas, &of_paper.smoothing_radii);
-                write(&mut maps.eigenvalues, eigenvalues.unwrap_or_default().as_flattened());
-                of_paper.depth_changes
-            }
+            Semantics::Pcl => self.maps_of_pcl(points, maps)?,
+            Semantics::Paper => self.maps_of_paper(points, maps)?,
         };
         if let Some(map) = &mut maps.depth_changes {
             for (to, from) in map.iter_mut().zip(depth_changes) {
@@ -253,10 +221,32 @@ impl Estimator {
         Ok(())
     }
 
-    /// A copy of the points without zeros, where those are missing.
-    fn without_zeros(&self, points: &Points) -> Result<Option<Cloud>, Error> {
+    /// Writes the maps but that of the depth changes, which is returned.
+    fn maps_of_pcl(&self, points: &Points, maps: &mut Maps) -> Result<Vec<bool>, Error> {
         let cleaned = || Cloud::new(points, &self.options);
-        self.options.zero_is_missing.then(cleaned).transpose()
+        let cleaned = self.options.is_beyond_pcl().then(cleaned).transpose()?;
+        let cleaned = cleaned.as_ref().map(Cloud::view);
+        let plain = Plain::new(cleaned.as_ref().unwrap_or(points), &self.options)?;
+        let eigenvalues = maps.eigenvalues.is_some().then(|| plain.eigenvalue_map());
+        copy(&mut maps.eigenvalues, eigenvalues.transpose()?.unwrap_or_default().as_flattened());
+        copy(&mut maps.distances, &plain.distances);
+        if let Some(map) = &mut maps.smoothing_areas {
+            for (at, to) in map.iter_mut().enumerate() {
+                *to = plain.window_side(at % points.width(), at / points.width()) as f32;
+            }
+        }
+        Ok(plain.depth_changes)
+    }
+
+    /// As [`Estimator::maps_of_pcl`].
+    fn maps_of_paper(&self, points: &Points, maps: &mut Maps) -> Result<Vec<bool>, Error> {
+        let of_paper = PaperMaps::new(points, &self.options)?;
+        let eigenvalues = maps.eigenvalues.is_some().then(|| of_paper.eigenvalue_map());
+        copy(&mut maps.eigenvalues, eigenvalues.transpose()?.unwrap_or_default().as_flattened());
+        copy(&mut maps.depth_radii, &of_paper.depth_radii);
+        copy(&mut maps.distances, &of_paper.distances);
+        copy(&mut maps.smoothing_areas, &of_paper.smoothing_radii);
+        Ok(of_paper.depth_changes)
     }
 
     /// As [`Estimator::compute_pixels`], by the plain form, where PCL's windows and sums alone are not what is asked for.
@@ -269,7 +259,7 @@ impl Estimator {
         let Estimator { options, scratch, cloud, second_pass, .. } = self;
         scratch.prepare(options.threads)?;
         cloud.read(points, options)?;
-        let points = &packed(cloud);
+        let points = &cloud.view();
         let workers = scratch.workers();
         let mut engine = PlainEngine { points, options, workers, sizes: Vec::new() };
         second_pass.compute(cloud, options, &mut engine)?;
@@ -294,7 +284,7 @@ impl Estimator {
         scratch.prepare(options.threads)?;
         fast::paper::read_cloud(&job, cloud, scratch)?;
         // To all windows, a point that misses a coordinate is missing whole.
-        let points = &packed(cloud).beside(normals);
+        let points = &cloud.view().beside(normals);
         // But for zeros, which are left out now, this is as PCL.
         if !options.has_second_pass() {
             return fast::compute(isa, points, options, indices, normals, scratch);
@@ -386,9 +376,9 @@ fn write_around(
     }
 }
 
-/// A view of a cloud's points.
-fn packed(cloud: &Cloud) -> Points<'_> {
-    let Cloud { points, width, height, .. } = cloud;
-    Points::interleaved(points.as_flattened(), *width, *height, 3, 0)
-        .expect("a packed copy of a valid cloud")
+/// Fills a map, if it is asked for.
+fn copy(map: &mut Option<&mut [f32]>, from: &[f32]) {
+    if let Some(map) = map {
+        map.copy_from_slice(from);
+    }
 }

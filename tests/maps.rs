@@ -224,6 +224,29 @@ fn zeros_that_are_missing_are_as_nan() {
     }
 }
 
+/// One-sided and crease windows see a point that lacks a coordinate nowhere, nor do the maps then.
+#[test]
+fn points_without_x_are_missing_to_the_second_pass() {
+    let mut lacking = Cloud::new(Kind::Wavy, 41, 33, 3);
+    let mut nans = lacking.clone();
+    for at in (10..17).flat_map(|y| (y * 41 + 20)..(y * 41 + 26)) {
+        lacking.points[at][0] = f32::NAN;
+        nans.points[at] = [f32::NAN; 3];
+    }
+    for semantics in Semantics::ALL {
+        for one_sided in [false, true] {
+            let mut options = options((Method::CovarianceMatrix, BorderPolicy::Mirror), 6.0, false);
+            options.semantics = semantics;
+            (options.one_sided_windows, options.crease_windows) = (one_sided, !one_sided);
+            let mut estimator = Estimator::new(options);
+            let [found, expected] = [&lacking, &nans].map(|cloud| compute(&mut estimator, cloud));
+            assert_same_bits(&found, &expected, 41, "normals");
+            let [found, expected] = [&lacking, &nans].map(|cloud| all_maps(&mut estimator, cloud));
+            assert_eq!(bits(&found), bits(&expected), "{:?}", estimator.options());
+        }
+    }
+}
+
 /// One pixel's normal over a window of this size.
 fn window(
     estimator: &mut Estimator,

@@ -78,6 +78,13 @@ impl Cloud {
         resize(&mut self.sums, summed, [0.0; 4])
     }
 
+    /// A view of the points.
+    pub fn view(&self) -> Points<'_> {
+        let Cloud { points, width, height, .. } = self;
+        Points::interleaved(points.as_flattened(), *width, *height, 3, 0)
+            .expect("a packed copy of a valid cloud")
+    }
+
     /// Bytes held.
     pub fn size(&self) -> usize {
         bytes(&self.points) + bytes(&self.depths) + bytes(&self.sums)

@@ -53,6 +53,7 @@ use crate::threads::Workers;
 
 /// The maps of [`Semantics::Paper`], row by row.
 pub(crate) struct PaperMaps {
+    cloud: Cloud,
     /// B in pixels; NaN at missing points.
     pub depth_radii: Vec<f32>,
     /// C.
@@ -86,18 +87,18 @@ impl PaperMaps {
             }
         };
         let smoothing_radii = table(depth_radii.iter().zip(&distances).map(radius))?;
-        Ok(PaperMaps { depth_radii, depth_changes, distances, smoothing_radii })
+        Ok(PaperMaps { cloud, depth_radii, depth_changes, distances, smoothing_radii })
     }
 
     /// The eigenvalues of the covariance matrices of all pixels' windows.
-    pub fn eigenvalue_map(&self, points: &Points) -> Result<Vec<[f32; 3]>, Error> {
-        let (width, height) = (points.width(), points.height());
+    pub fn eigenvalue_map(&self) -> Result<Vec<[f32; 3]>, Error> {
+        let Cloud { width, height, .. } = self.cloud;
         let window = |x: usize, y: usize| {
             let radius = self.smoothing_radii[y * width + x] as usize;
             (radius > 0).then(|| once(window((x, y), radius, width, height)))
         };
         let reach = self.smoothing_radii.iter().copied().fold(0.0, f32::max);
-        eigenvalue_map(points, reach as usize, window)
+        eigenvalue_map(&self.cloud.view(), reach as usize, window)
     }
 }
 
