@@ -144,6 +144,9 @@ impl Default for PaperOptions {
 }
 
 impl PaperOptions {
+    /// The largest radius that can be asked for.
+    pub(crate) const MOST_RADIUS: u32 = 1000;
+
     /// The alpha of a stereo or structured light sensor: its depth is focal * baseline / disparity, so that one
     /// disparity step is a depth change of step / (focal * baseline) d^2.
     ///
@@ -161,7 +164,7 @@ impl PaperOptions {
             && self.smallest_radius >= 1
             && self.smallest_radius <= self.least_depth_radius
             && self.least_depth_radius <= self.largest_radius
-            && self.largest_radius <= 1000;
+            && self.largest_radius <= Self::MOST_RADIUS;
         if in_range { Ok(()) } else { Err(Error::OptionValue) }
     }
 }
@@ -202,12 +205,12 @@ pub struct Options {
     /// Takes points at (0, 0, 0) as missing, as LiDARs and some depth cameras write them; default off.
     pub zero_is_missing: bool,
     /// Gives pixels near a depth change a window on their own side of it, so that every pixel with two neighbours on its
-    /// surface that are not in line with it has a normal; default off. Takes the sensor's [`PaperOptions::alpha`] and
+    /// surface that are not in line with it has a normal; default off. Takes [`PaperOptions::alpha`], [`PaperOptions::gamma`] and
     /// [`PaperOptions::largest_radius`] in either semantics.
     pub one_sided_windows: bool,
-    /// In a second pass gives every pixel, but on round surfaces, the window around or beside it that is worth most, so that edges
-    /// without a depth change stay sharp and flat surfaces become smoother; default off. Takes the same two parameters in
-    /// either semantics.
+    /// In a second pass gives every pixel, but on round surfaces, that window around or beside it whose plane is expected to be
+    /// nearest to the surface (docs/paper.md), so that edges without a depth change stay sharp and flat surfaces become
+    /// smoother; default off. Takes [`PaperOptions::alpha`] and [`PaperOptions::largest_radius`] in either semantics.
     pub crease_windows: bool,
 }
 
@@ -246,7 +249,7 @@ impl Options {
             return self.paper.check();
         }
         if self.has_second_pass() {
-            // It asks for alpha and the largest radius.
+            // It asks for some of them.
             self.paper.check()?;
         }
         if !is_positive(self.normal_smoothing_size) {

@@ -4,7 +4,8 @@
  * Functions return a status: IINE_OK (0), or one of IINE_ERROR_*, and then have written nothing (but see
  * IINE_ERROR_OUT_OF_MEMORY and IINE_ERROR_INTERNAL); iine_status_string() has the text. Nothing here prints, exits or
  * throws, with two exceptions: with IINE_ERROR_INTERNAL, a defect of this library, stderr says what went wrong; and
- * where memory for starting threads is missing, the process may be aborted.
+ * where some bytes are missing to start threads or hand them work, or for the second pass over less than three columns
+ * or rows, the process may be aborted.
  */
 
 #ifndef IINE_IINE_H
@@ -466,7 +467,8 @@ int32_t iine_estimator_set_border_policy(struct iine_estimator *estimator, int32
 /**
  * Sets the smoothing size in pixels: finite, above 0; default 10. The side of a pixel's window is
  * min(distance to the nearest depth change, smoothing size) rounded down; where that minimum is not above 2 there is no
- * normal. Depth-dependent smoothing adds to the size; without it, sizes up to 2 give no normals.
+ * normal. Depth-dependent smoothing adds to the size; without it, sizes up to 2 give no
+ * normals but those of one-sided windows.
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
  *
@@ -515,7 +517,7 @@ int32_t iine_estimator_set_viewpoint(struct iine_estimator *estimator, float x, 
  * Sets the number of threads: 1 (the default) computes on the calling thread, 0 takes one per processor. The result
  * does not depend on it, bit for bit. They are started by the next computation, and live until another number is asked
  * for, the scratch memory is released or the estimator is freed; a fork of the process starts its own with its next
- * computation. Where memory for starting them is missing, the process may be aborted. On Linux they keep off the core that
+ * computation. Where memory for starting them or handing them work is missing, the process may be aborted. On Linux they keep off the core that
  * the calling thread is on, if they may run on as many cores as there are threads.
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE above 1024.
@@ -567,8 +569,8 @@ int32_t iine_estimator_set_paper_alpha(struct iine_estimator *estimator,
 int32_t iine_estimator_set_paper_beta(struct iine_estimator *estimator, float beta);
 
 /**
- * Sets gamma: neighbours whose depths differ by gamma alpha d^2 or more are a depth change apart (Eq. 6). Without
- * unit; finite, above 0; default 5.
+ * Sets gamma: neighbours whose depths differ by gamma alpha d^2 or more are a depth change apart (Eq. 6); with
+ * one-sided windows also in IINE_SEMANTICS_PCL. Without unit; finite, above 0; default 5.
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
  *
@@ -579,11 +581,11 @@ int32_t iine_estimator_set_paper_gamma(struct iine_estimator *estimator,
                                        float gamma);
 
 /**
- * Sets the limits of the window's radius, in pixels: where it is below `smallest` there is no window; what the
- * depth asks for (Eq. 5) is at least `least_depth` and at most `largest`. With IINE_SEMANTICS_PAPER; `largest` is
- * also that of one-sided and crease windows.
+ * Sets the limits of the window's radius, in pixels: where it is below `smallest_radius` there is no window;
+ * what the depth asks for (Eq. 5) is at least `least_depth_radius` and at most `largest_radius`. With
+ * IINE_SEMANTICS_PAPER; `largest_radius` is also that of one-sided and crease windows.
  *
- * 1 <= smallest <= least_depth <= largest <= 1000; default 2, 5, 20.
+ * 1 <= smallest_radius <= least_depth_radius <= largest_radius <= 1000; default 2, 5, 20.
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
  *
@@ -591,9 +593,9 @@ int32_t iine_estimator_set_paper_gamma(struct iine_estimator *estimator,
  * `estimator` is NULL or a live estimator that no other thread uses.
  */
 int32_t iine_estimator_set_paper_radii(struct iine_estimator *estimator,
-                                       uint32_t smallest,
-                                       uint32_t least_depth,
-                                       uint32_t largest);
+                                       uint32_t smallest_radius,
+                                       uint32_t least_depth_radius,
+                                       uint32_t largest_radius);
 
 /**
  * Sets how the distance to the nearest depth change is measured with IINE_SEMANTICS_PAPER: one of
@@ -628,9 +630,9 @@ int32_t iine_estimator_set_zero_is_missing(struct iine_estimator *estimator, int
 
 /**
  * Whether pixels near a depth change get a window on their own side of it, so that every pixel with two neighbours on its
- * surface that are not in line with it has a normal: 0 (the default) or 1. With either semantics; takes the sensor's
- * alpha from `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of
- * `iine_estimator_set_paper_radii`.
+ * surface that are not in line with it has a normal: 0 (the default) or 1. With either semantics; takes alpha and
+ * gamma from `iine_estimator_set_paper_alpha` and `iine_estimator_set_paper_gamma`, and no window's radius is above the
+ * largest of `iine_estimator_set_paper_radii`.
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
  *
@@ -641,9 +643,9 @@ int32_t iine_estimator_set_one_sided_windows(struct iine_estimator *estimator,
                                              int32_t one_sided_windows);
 
 /**
- * Whether a second pass gives every pixel, but on round surfaces, the window around or beside it that is worth most, so that
- * edges without a depth change stay sharp and flat surfaces become smoother: 0 (the default) or 1. With either semantics;
- * takes the sensor's alpha from `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of
+ * Whether a second pass gives every pixel, but on round surfaces, that window around or beside it whose plane is expected to
+ * be nearest to the surface (docs/paper.md), so that edges without a depth change stay sharp and flat surfaces become
+ * smoother: 0 (the default) or 1. With either semantics; takes alpha from `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of
  * `iine_estimator_set_paper_radii`.
  *
  * Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.

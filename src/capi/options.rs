@@ -38,6 +38,12 @@ unsafe fn set_paper(
     unsafe { set(estimator, change) }
 }
 
+/// The value that has this number: `all` are in the order of theirs, from 0.
+fn known<T: Copy>(all: &[T], number: i32) -> Result<T, Error> {
+    let value = usize::try_from(number).ok().and_then(|number| all.get(number));
+    value.copied().ok_or(Error::OptionValue)
+}
+
 fn switch(number: i32) -> Result<bool, Error> {
     match number {
         0 => Ok(false),
@@ -58,8 +64,7 @@ pub unsafe extern "C" fn iine_estimator_set_method(
     method: i32,
 ) -> i32 {
     let change = |options: &mut Options| {
-        let known = Method::ALL.into_iter().find(|known| *known as i32 == method);
-        options.method = known.ok_or(Error::OptionValue)?;
+        options.method = known(&Method::ALL, method)?;
         Ok(())
     };
     // SAFETY: promised by the caller.
@@ -78,8 +83,7 @@ pub unsafe extern "C" fn iine_estimator_set_border_policy(
     border_policy: i32,
 ) -> i32 {
     let change = |options: &mut Options| {
-        let known = BorderPolicy::ALL.into_iter().find(|known| *known as i32 == border_policy);
-        options.border_policy = known.ok_or(Error::OptionValue)?;
+        options.border_policy = known(&BorderPolicy::ALL, border_policy)?;
         Ok(())
     };
     // SAFETY: promised by the caller.
@@ -88,7 +92,8 @@ pub unsafe extern "C" fn iine_estimator_set_border_policy(
 
 /// Sets the smoothing size in pixels: finite, above 0; default 10. The side of a pixel's window is
 /// min(distance to the nearest depth change, smoothing size) rounded down; where that minimum is not above 2 there is no
-/// normal. Depth-dependent smoothing adds to the size; without it, sizes up to 2 give no normals.
+/// normal. Depth-dependent smoothing adds to the size; without it, sizes up to 2 give no
+/// normals but those of one-sided windows.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
 ///
@@ -175,7 +180,7 @@ pub unsafe extern "C" fn iine_estimator_set_viewpoint(
 /// Sets the number of threads: 1 (the default) computes on the calling thread, 0 takes one per processor. The result
 /// does not depend on it, bit for bit. They are started by the next computation, and live until another number is asked
 /// for, the scratch memory is released or the estimator is freed; a fork of the process starts its own with its next
-/// computation. Where memory for starting them is missing, the process may be aborted. On Linux they keep off the core that
+/// computation. Where memory for starting them or handing them work is missing, the process may be aborted. On Linux they keep off the core that
 /// the calling thread is on, if they may run on as many cores as there are threads.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE above 1024.
@@ -215,8 +220,7 @@ pub unsafe extern "C" fn iine_estimator_set_semantics(
     semantics: i32,
 ) -> i32 {
     let change = |options: &mut Options| {
-        let known = Semantics::ALL.into_iter().find(|known| *known as i32 == semantics);
-        options.semantics = known.ok_or(Error::OptionValue)?;
+        options.semantics = known(&Semantics::ALL, semantics)?;
         Ok(())
     };
     // SAFETY: promised by the caller.
@@ -265,8 +269,8 @@ pub unsafe extern "C" fn iine_estimator_set_paper_beta(
     unsafe { set_paper(estimator, change) }
 }
 
-/// Sets gamma: neighbours whose depths differ by gamma alpha d^2 or more are a depth change apart (Eq. 6). Without
-/// unit; finite, above 0; default 5.
+/// Sets gamma: neighbours whose depths differ by gamma alpha d^2 or more are a depth change apart (Eq. 6); with
+/// one-sided windows also in IINE_SEMANTICS_PCL. Without unit; finite, above 0; default 5.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
 ///
@@ -285,11 +289,11 @@ pub unsafe extern "C" fn iine_estimator_set_paper_gamma(
     unsafe { set_paper(estimator, change) }
 }
 
-/// Sets the limits of the window's radius, in pixels: where it is below `smallest` there is no window; what the
-/// depth asks for (Eq. 5) is at least `least_depth` and at most `largest`. With IINE_SEMANTICS_PAPER; `largest` is
-/// also that of one-sided and crease windows.
+/// Sets the limits of the window's radius, in pixels: where it is below `smallest_radius` there is no window;
+/// what the depth asks for (Eq. 5) is at least `least_depth_radius` and at most `largest_radius`. With
+/// IINE_SEMANTICS_PAPER; `largest_radius` is also that of one-sided and crease windows.
 ///
-/// 1 <= smallest <= least_depth <= largest <= 1000; default 2, 5, 20.
+/// 1 <= smallest_radius <= least_depth_radius <= largest_radius <= 1000; default 2, 5, 20.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
 ///
@@ -298,14 +302,14 @@ pub unsafe extern "C" fn iine_estimator_set_paper_gamma(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn iine_estimator_set_paper_radii(
     estimator: *mut iine_estimator,
-    smallest: u32,
-    least_depth: u32,
-    largest: u32,
+    smallest_radius: u32,
+    least_depth_radius: u32,
+    largest_radius: u32,
 ) -> i32 {
     let change = |paper: &mut PaperOptions| {
-        paper.smallest_radius = smallest;
-        paper.least_depth_radius = least_depth;
-        paper.largest_radius = largest;
+        paper.smallest_radius = smallest_radius;
+        paper.least_depth_radius = least_depth_radius;
+        paper.largest_radius = largest_radius;
         Ok(())
     };
     // SAFETY: promised by the caller.
@@ -325,8 +329,7 @@ pub unsafe extern "C" fn iine_estimator_set_paper_distance_metric(
     distance_metric: i32,
 ) -> i32 {
     let change = |paper: &mut PaperOptions| {
-        let known = DistanceMetric::ALL.into_iter().find(|known| *known as i32 == distance_metric);
-        paper.distance_metric = known.ok_or(Error::OptionValue)?;
+        paper.distance_metric = known(&DistanceMetric::ALL, distance_metric)?;
         Ok(())
     };
     // SAFETY: promised by the caller.
@@ -345,8 +348,7 @@ pub unsafe extern "C" fn iine_estimator_set_paper_depth(
     depth: i32,
 ) -> i32 {
     let change = |paper: &mut PaperOptions| {
-        let known = Depth::ALL.into_iter().find(|known| *known as i32 == depth);
-        paper.depth = known.ok_or(Error::OptionValue)?;
+        paper.depth = known(&Depth::ALL, depth)?;
         Ok(())
     };
     // SAFETY: promised by the caller.
@@ -373,9 +375,9 @@ pub unsafe extern "C" fn iine_estimator_set_zero_is_missing(
 }
 
 /// Whether pixels near a depth change get a window on their own side of it, so that every pixel with two neighbours on its
-/// surface that are not in line with it has a normal: 0 (the default) or 1. With either semantics; takes the sensor's
-/// alpha from `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of
-/// `iine_estimator_set_paper_radii`.
+/// surface that are not in line with it has a normal: 0 (the default) or 1. With either semantics; takes alpha and
+/// gamma from `iine_estimator_set_paper_alpha` and `iine_estimator_set_paper_gamma`, and no window's radius is above the
+/// largest of `iine_estimator_set_paper_radii`.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
 ///
@@ -394,9 +396,9 @@ pub unsafe extern "C" fn iine_estimator_set_one_sided_windows(
     unsafe { set(estimator, change) }
 }
 
-/// Whether a second pass gives every pixel, but on round surfaces, the window around or beside it that is worth most, so that
-/// edges without a depth change stay sharp and flat surfaces become smoother: 0 (the default) or 1. With either semantics;
-/// takes the sensor's alpha from `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of
+/// Whether a second pass gives every pixel, but on round surfaces, that window around or beside it whose plane is expected to
+/// be nearest to the surface (docs/paper.md), so that edges without a depth change stay sharp and flat surfaces become
+/// smoother: 0 (the default) or 1. With either semantics; takes alpha from `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of
 /// `iine_estimator_set_paper_radii`.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.

@@ -1,9 +1,10 @@
 //! The paper's own windows and methods, and what its conclusion leaves open: windows that end at depth changes and
 //! at creases, both also on top of PCL's windows.
 //!
-//! The steps, in their plain forms, are `depth_change`, `distance`, `smoothing_area` and `methods`. The second pass is
-//! `second_pass`, with `bends`, `even_windows`, `choices` and `surroundings`. What the steps share is that a
-//! pixel's window is a rectangle inside the image, and that a method turns the points in a rectangle into a normal.
+//! The steps, in their plain forms, are `depth_change`, `distance`, `smoothing_area` and `methods`, over a `cloud`. The second pass
+//! is `second_pass`, with `noise`, `bends`, `even_windows` (of `blocks`, by the `planes` of their points, from `summed_area`s),
+//! `choices` and `surroundings`; `marks` are bits of pixels. What the steps share is that a pixel's window is a rectangle inside
+//! the image, and that a method turns the points in a rectangle into a normal.
 
 mod bends;
 mod blocks;
@@ -37,7 +38,6 @@ pub(crate) use methods::estimate as plain_estimate;
 pub(crate) use noise::Noise;
 pub(crate) use planes::{JITTER, Plane, estimate_in_space, inverse_depth};
 pub(crate) use second_pass::{Engine, SecondPass, Windows};
-pub(crate) use smoothing_area::window;
 pub(crate) use summed_area::{ROUNDING, SummedArea};
 
 use std::iter::once;
@@ -95,7 +95,7 @@ impl PaperMaps {
         let Cloud { width, height, .. } = self.cloud;
         let window = |x: usize, y: usize| {
             let radius = self.smoothing_radii[y * width + x] as usize;
-            (radius > 0).then(|| once(window((x, y), radius, width, height)))
+            (radius > 0).then(|| once(Rect::around((x, y), radius, (width, height))))
         };
         let reach = self.smoothing_radii.iter().copied().fold(0.0, f32::max);
         eigenvalue_map(&self.cloud.view(), reach as usize, window)

@@ -1,7 +1,6 @@
 //! Step 3: the smoothing area map (the paper's B and R, Eq. 4, 5 and 8): the radius of every pixel's window.
 
 use crate::options::PaperOptions;
-use crate::rect::Rect;
 
 /// The smallest depth change at a depth: f_DC (Eq. 4).
 pub(crate) fn smallest_depth_change(depth: f32, options: &PaperOptions) -> f32 {
@@ -33,11 +32,4 @@ pub(crate) fn depth_radius(depth: f32, options: &PaperOptions) -> f32 {
 pub(crate) fn smoothing_radius(depth_radius: f32, distance: f32, options: &PaperOptions) -> f32 {
     let radius = depth_radius.min(distance / std::f32::consts::SQRT_2);
     if radius >= options.smallest_radius as f32 { radius } else { 0.0 }
-}
-
-/// The window of a radius: the pixels at most that far from its centre in either direction, inside the image.
-///
-/// Eq. 3 as printed leaves out the first row and column of them, and is off the centre that its text names.
-pub(crate) fn window(pixel: (usize, usize), radius: usize, width: usize, height: usize) -> Rect {
-    Rect::around(pixel, radius, (width, height))
 }

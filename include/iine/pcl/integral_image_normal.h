@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <type_traits>
 #include <vector>
 
 #include <iine/iine.h>
@@ -170,7 +171,7 @@ namespace iine
       /** \brief Set the factor f of the depth change threshold: neighbours whose z differ by more than
         * 2 f (|z| + 1), z being that of the left or upper one, or of which one's z is not finite, are on different
         * surfaces.
-        * \param[in] max_depth_change_factor the factor, in the cloud's unit
+        * \param[in] max_depth_change_factor the factor; the 1 is one of the cloud's unit
         */
       void
       setMaxDepthChangeFactor (float max_depth_change_factor)
@@ -180,7 +181,8 @@ namespace iine
 
       /** \brief Set the side of the largest window without depth-dependent smoothing. A pixel's window has the side
         * min (distance to the nearest depth change, this), rounded down; where that minimum is not above 2 there is no
-        * normal. \ref setDepthDependentSmoothing adds to the size; without it, sizes up to 2 give no normals.
+        * normal. \ref setDepthDependentSmoothing adds to the size; without it, sizes up to 2 give no normals but those of
+        * \ref setOneSidedWindows.
         * \param[in] normal_smoothing_size the side in pixels, finite and above 0; anything else is refused with a
         * printed error
         */
@@ -407,20 +409,21 @@ namespace iine
       /** \brief Set the limits of the window's radius with SEMANTICS_PAPER, in pixels; the largest is also that of
         * \ref setOneSidedWindows and \ref setCreaseWindows. Not in PCL's class.
         *
-        * 1 <= smallest <= least_depth <= largest <= 1000; anything else is refused with a printed error.
-        * \param[in] smallest where the radius is below this there is no window; default 2
-        * \param[in] least_depth the depth asks for at least this; default 5
-        * \param[in] largest and for at most this; default 20
+        * 1 <= smallest_radius <= least_depth_radius <= largest_radius <= 1000; anything else is refused with a printed error.
+        * \param[in] smallest_radius where the radius is below this there is no window; default 2
+        * \param[in] least_depth_radius the depth asks for at least this; default 5
+        * \param[in] largest_radius and for at most this; default 20
         */
       void
-      setPaperRadii (unsigned smallest, unsigned least_depth, unsigned largest)
+      setPaperRadii (unsigned smallest_radius, unsigned least_depth_radius, unsigned largest_radius)
       {
-        const int status = iine_estimator_set_paper_radii (handle_.get (), smallest, least_depth, largest);
+        const int status =
+            iine_estimator_set_paper_radii (handle_.get (), smallest_radius, least_depth_radius, largest_radius);
         if (!isTaken ("setPaperRadii", status))
           return;
-        options_.smallest_radius = smallest;
-        options_.least_depth_radius = least_depth;
-        options_.largest_radius = largest;
+        options_.smallest_radius = smallest_radius;
+        options_.least_depth_radius = least_depth_radius;
+        options_.largest_radius = largest_radius;
       }
 
       /** \brief Set how the distance to the nearest depth change is measured with SEMANTICS_PAPER. Not in PCL's class.
@@ -453,7 +456,7 @@ namespace iine
 
       /** \brief Set whether pixels near a depth change get a window on their own side of it, so that every pixel with two
         * neighbours on its surface that are not in line with it has a normal. With either semantics, and the alpha of
-        * \ref setPaperAlpha and the largest radius of \ref setPaperRadii. Not in PCL's class.
+        * \ref setPaperAlpha, the gamma of \ref setPaperGamma and the largest radius of \ref setPaperRadii. Not in PCL's class.
         * \param[in] one_sided_windows whether they do; default false
         */
       void
@@ -462,9 +465,9 @@ namespace iine
         options_.one_sided_windows = one_sided_windows;
       }
 
-      /** \brief Set whether a second pass gives every pixel, but on round surfaces, the window around or beside it that is worth
-        * most, so that edges without a depth change stay sharp and flat surfaces become smoother. With either semantics, and the
-        * alpha of \ref setPaperAlpha and the largest radius of \ref setPaperRadii. Not in PCL's class.
+      /** \brief Set whether a second pass gives every pixel, but on round surfaces, that window around or beside it whose
+        * plane is expected to be nearest to the surface (docs/paper.md), so that edges without a depth change stay sharp and
+        * flat surfaces become smoother. With either semantics, and the alpha of \ref setPaperAlpha and the largest radius of \ref setPaperRadii. Not in PCL's class.
         * \param[in] crease_windows whether it does; default false
         */
       void
@@ -770,7 +773,7 @@ namespace iine
         const iine_normals normals = outputNormals (output.points.front ());
         if (areIndicesWholeCloud ())
           return (iine_estimator_compute (handle_.get (), &points, &normals));
-        static_assert (sizeof (pcl::index_t) == sizeof (std::int32_t), "the C API takes 32-bit indices");
+        static_assert (std::is_same<pcl::index_t, std::int32_t>::value, "the C API takes signed 32-bit indices");
         return (iine_estimator_compute_indices (handle_.get (), &points, indices_->data (), indices_->size (),
                                                 &normals));
       }

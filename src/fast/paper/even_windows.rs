@@ -190,50 +190,6 @@ impl<S: Groups> Fits<S> {
         }
     }
 
-    /// Writes the windows of the lanes that are there, and none for the others that are asked for.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    unsafe fn write_windows(
-        &self,
-        radii: Floats<S>,
-        bend2: Floats<S>,
-        (there, asked): (u32, u32),
-        noise: &Noise,
-        windows: &mut [EvenWindow],
-    ) {
-        const { assert!(size_of::<EvenWindow>() == size_of::<[f32; 12]>()) };
-        let ([a, b, c], [x, y, z]) = (self.q, self.ray);
-        let mut found = [EvenWindow::default(); GROUP];
-        // SAFETY: as the caller's; a window is twelve floats.
-        unsafe {
-            // As `even_window` has it.
-            let (one, points) = (Floats::splat(1.0), self.points.narrow());
-            let side = Floats::splat(2.0) * radii + one;
-            let per_noise = Floats::splat(12.0 * noise.area) / points / (side * side);
-            let steepness = self.steepness_squared.narrow().sqrt();
-            let fours = [
-                [radii, a.narrow(), b.narrow(), c.narrow()],
-                [x.narrow(), y.narrow(), z.narrow(), steepness],
-                [
-                    self.unevenness.narrow(),
-                    self.noise(noise, Floats::splat(3.0)).narrow(),
-                    per_noise,
-                    bend2,
-                ],
-            ];
-            let to = found.as_mut_ptr().cast::<f32>();
-            for (fields, place) in fours.into_iter().zip((0..).step_by(4)) {
-                let fields = fields.map(|field| S::and(S::mask(there), field.0));
-                S::store_points(fields, 3, to.add(place), size_of::<EvenWindow>());
-            }
-        }
-        for lane in Bits(asked) {
-            windows[lane] = found[lane];
-        }
-    }
-
     /// Writes their estimates: those in space in the lanes of `jagged` windows.
     ///
     /// # Safety
@@ -272,6 +228,63 @@ impl<S: Groups> Fits<S> {
         for lane in Bits(asked) {
             let [x, y, z, curvature] = found[lane];
             estimates[lane] = [x, y, z, if has_curvature { curvature } else { f32::NAN }];
+        }
+    }
+}
+
+/// What is found for eight blocks.
+struct Found<S: Groups> {
+    best: Fits<S>,
+    /// The windows' radii, 0 for none, and how they bend.
+    radii: Floats<S>,
+    bend2: Floats<S>,
+    /// The lanes of jagged windows, those in which rounding may have had a say, and those that wait for another layer.
+    jagged: u32,
+    doubtful: u32,
+    hidden: u32,
+}
+
+impl<S: Groups> Found<S> {
+    /// Writes the windows of the lanes that are there, and none for the others that are asked for.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
+    #[inline(always)]
+    unsafe fn write_windows(
+        &self,
+        (there, asked): (u32, u32),
+        noise: &Noise,
+        windows: &mut [EvenWindow],
+    ) {
+        const { assert!(size_of::<EvenWindow>() == size_of::<[f32; 12]>()) };
+        let &Found { best, radii, bend2, .. } = self;
+        let ([a, b, c], [x, y, z]) = (best.q, best.ray);
+        let mut found = [EvenWindow::default(); GROUP];
+        // SAFETY: as the caller's; a window is twelve floats.
+        unsafe {
+            // As `even_window` has it.
+            let (one, points) = (Floats::splat(1.0), best.points.narrow());
+            let side = Floats::splat(2.0) * radii + one;
+            let per_noise = Floats::splat(12.0 * noise.area) / points / (side * side);
+            let steepness = best.steepness_squared.narrow().sqrt();
+            let fours = [
+                [radii, a.narrow(), b.narrow(), c.narrow()],
+                [x.narrow(), y.narrow(), z.narrow(), steepness],
+                [
+                    best.unevenness.narrow(),
+                    best.noise(noise, Floats::splat(3.0)).narrow(),
+                    per_noise,
+                    bend2,
+                ],
+            ];
+            let to = found.as_mut_ptr().cast::<f32>();
+            for (fields, place) in fours.into_iter().zip((0..).step_by(4)) {
+                let fields = fields.map(|field| S::and(S::mask(there), field.0));
+                S::store_points(fields, 3, to.add(place), size_of::<EvenWindow>());
+            }
+        }
+        for lane in Bits(asked) {
+            windows[lane] = found[lane];
         }
     }
 }
@@ -365,11 +378,46 @@ impl EvenTile<'_> {
         estimates: &mut [[f32; 4]],
     ) -> bool {
         let Even { cloud, asked: of_image, .. } = self.even;
+        let &Eight { block, asked, .. } = eight;
+        // SAFETY: as the caller's.
+        unsafe {
+            let found = self.find::<S>(rings, eight, windows.len());
+            let Found { best, jagged, doubtful, hidden, .. } = found;
+            for lane in Bits(asked & hidden) {
+                windows[lane].radius = WAITS;
+            }
+            let (there, asked) = (Floats::splat(0.0).lt(found.radii), asked & !hidden);
+            found.write_windows((there, asked), &of_image.noise, windows);
+            best.write_estimates(jagged & asked, of_image.has_curvature, asked, estimates);
+            // What rounding could decide is left to the plain form.
+            for lane in Bits(asked & doubtful) {
+                (windows[lane], estimates[lane]) = even_window(cloud, of_image, block + lane);
+            }
+            for lane in Bits(asked & there & best.turned & !doubtful) {
+                let (radius, is_jagged) = (windows[lane].radius as u32, jagged >> lane & 1 != 0);
+                estimates[lane] = estimate_of(cloud, of_image, block + lane, radius, is_jagged);
+            }
+            hidden != 0
+        }
+    }
+
+    /// The windows of so many of eight blocks.
+    ///
+    /// # Safety
+    /// As [`EvenTile::row`].
+    #[inline(always)]
+    unsafe fn find<S: Groups>(
+        &self,
+        rings: &Rings<MOMENTS>,
+        eight: &Eight,
+        blocks: usize,
+    ) -> Found<S> {
+        let of_image = self.even.asked;
         let &Eight { pixels, block, asked, .. } = eight;
         let y = rings.aimed.y;
         let hides_some = rings.layer.hides_some();
         let [mut wanted, mut clean] = [[0.0; GROUP]; 2];
-        let of_blocks = block..block + windows.len();
+        let of_blocks = block..block + blocks;
         for (to, from) in wanted.iter_mut().zip(&of_image.wanted[of_blocks.clone()]) {
             *to = *from as f32;
         }
@@ -445,22 +493,7 @@ impl EvenTile<'_> {
                 radii.take(S::mask(starts), largest);
                 even |= starts;
             }
-            for lane in Bits(asked & hidden) {
-                windows[lane].radius = WAITS;
-            }
-            let (there, asked) = (zero.lt(found), asked & !hidden);
-            best.write_windows(found, bend2, (there, asked), &of_image.noise, windows);
-            best.write_estimates(jagged_found & asked, of_image.has_curvature, asked, estimates);
-            // What rounding could decide is left to the plain form.
-            for lane in Bits(asked & doubtful) {
-                (windows[lane], estimates[lane]) = even_window(cloud, of_image, block + lane);
-            }
-            for lane in Bits(asked & there & best.turned & !doubtful) {
-                let (radius, is_jagged) =
-                    (windows[lane].radius as u32, jagged_found >> lane & 1 != 0);
-                estimates[lane] = estimate_of(cloud, of_image, block + lane, radius, is_jagged);
-            }
-            hidden != 0
+            Found { best, radii: found, bend2, jagged: jagged_found, doubtful, hidden }
         }
     }
 

@@ -1,6 +1,6 @@
 //! The paper's windows and methods, fast: depths (`depths`), the radii of the windows of the whole image (`windows`),
 //! then tile by tile, and if need be layer by layer (`layers`), integral images of the method's channels (`integrals`,
-//! `methods`) and the normals (`tile`). For the second pass (`engine`), its depth changes (`depth_changes`), even windows
+//! `methods`), which points are there (`presence`), the windows' sums (`rects`) and the normals (`tile`). For the second pass (`engine`), its depth changes (`depth_changes`), even windows
 //! (`even_windows`), which of them each pixel takes (`choices`), and their normals written to the pixels (`chosen`).
 
 mod choices;
@@ -43,7 +43,7 @@ use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::memory::{bytes, refill, resize};
 use crate::methods::Estimate;
-use crate::options::{DistanceMetric, Method, Options};
+use crate::options::{DistanceMetric, Method, Options, PaperOptions};
 use crate::paper::{
     Asked, BLOCK, Blocks, Cloud, DepthChanges, EvenWindow, EvenWindows, Marks, NO_WINDOW,
     PaperMaps, SecondPass, WORD, Windows, is_depth_change, word_of,
@@ -51,8 +51,11 @@ use crate::paper::{
 use crate::simd::{GROUP, Groups};
 use crate::threads::Workers;
 
-/// Elements of a tile's rings at most: floats hold their indices. Room for the largest windows there are.
-const MOST_INDICES: usize = 1 << 24;
+/// Floats hold the indices of a tile's rings, of four of the largest radii and what those reach, and less than a hundred more.
+const _: () = {
+    let radius = PaperOptions::MOST_RADIUS as usize;
+    assert!((6 * radius + 100) * (2 * radius + 3) < 1 << 24);
+};
 
 /// Rows of a tile: windows reach farther than PCL's, and more rows around it are summed again for the next one.
 const TILE_ROWS: usize = 256;
@@ -355,7 +358,6 @@ fn share_out(
 fn tiling(width: usize, height: usize, reach: usize, column: usize) -> Tiling {
     let ring = rows_of_rings(reach, height);
     let columns = (RING_BYTES / (column * ring)).max(4 * reach);
-    let columns = columns.min(MOST_INDICES / ring - 2 * reach - 4 * GROUP);
     let across = width.div_ceil(columns.next_multiple_of(GROUP));
     let columns = width.div_ceil(across).next_multiple_of(BLOCK * GROUP);
     let down = height.div_ceil(TILE_ROWS);

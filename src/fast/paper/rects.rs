@@ -3,7 +3,7 @@
 use std::hint::black_box;
 
 use super::integrals::{Aimed, MARGIN, Rings};
-use crate::fast::arithmetic::{Doubles, Floats};
+use crate::fast::arithmetic::{Doubles, Floats, between};
 use crate::simd::{GROUP, Groups};
 
 /// The rows of the windows of a radius around a row's pixels, inside the image.
@@ -293,6 +293,8 @@ fn one_by_one<T>(indices: &T) -> &T {
 
 /// A window's corners, above and below, left and right: where their eight channels are.
 type Corners = [[usize; 2]; 2];
+/// These corners' rows and ends.
+const ENDS: [[[usize; 2]; 2]; 2] = [[[0, 0], [0, 1]], [[1, 0], [1, 1]]];
 
 /// The sums between the corners of eight windows, which are of pixels side by side and `ALIKE`, or not.
 ///
@@ -317,8 +319,8 @@ unsafe fn sums_between<S: Groups, const N: usize, const ALIKE: bool>(
         if Rings::<N>::HAS_EIGHT {
             let mut windows = [zero; GROUP];
             for lane in 0..GROUP {
-                windows[lane] =
-                    between::<S>(corners(lane).map(|row| row.map(|c| eights.wrapping_add(c))));
+                let load = |corner| Doubles::<S>(S::load_d(eights.wrapping_add(corner)));
+                windows[lane] = between(corners(lane), load).0;
             }
             let eight = S::transpose_d(windows);
             for i in 0..8 {
@@ -329,14 +331,18 @@ unsafe fn sums_between<S: Groups, const N: usize, const ALIKE: bool>(
             let mut windows = [zero; 4];
             if ALIKE {
                 for i in 0..4 {
-                    windows[i] = between::<S>(four(2 * i));
+                    windows[i] = between(four(2 * i), |corner| Doubles::<S>(S::load_d(corner))).0;
                 }
                 let [a, b, c, d] = windows;
                 let ([a, b], [c, d]) = (S::join_halves_d(a, c), S::join_halves_d(b, d));
                 windows = [a, b, c, d];
             } else {
                 for lane in 0..4 {
-                    windows[lane] = between_fours::<S>([four(lane), four(4 + lane)]);
+                    let two = [four(lane), four(4 + lane)];
+                    let load = |[row, end]: [usize; 2]| {
+                        Doubles::<S>(S::load_fours_d(|window| two[window][row][end]))
+                    };
+                    windows[lane] = between(ENDS, load).0;
                 }
             }
             let four = S::transpose_fours_d(windows);
@@ -349,64 +355,19 @@ unsafe fn sums_between<S: Groups, const N: usize, const ALIKE: bool>(
             for half in 0..2 {
                 let first = 4 * half;
                 windows[half] = if ALIKE {
-                    between::<S>(pair(first))
+                    between(pair(first), |corner| Doubles::<S>(S::load_d(corner))).0
                 } else {
-                    between_pairs::<S>([
-                        pair(first),
-                        pair(first + 1),
-                        pair(first + 2),
-                        pair(first + 3),
-                    ])
+                    let four = [pair(first), pair(first + 1), pair(first + 2), pair(first + 3)];
+                    let load = |[row, end]: [usize; 2]| {
+                        Doubles::<S>(S::load_pairs_d(|window| four[window][row][end]))
+                    };
+                    between(ENDS, load).0
                 };
             }
             let [first, second] = S::unpair_d(windows[0], windows[1]);
             [channels[N - 2], channels[N - 1]] = [Doubles(first), Doubles(second)];
         }
         channels
-    }
-}
-
-/// A window's corners, where some of their channels are.
-type Ends = [[*const f64; 2]; 2];
-
-/// The sums between corners, of as many channels as there are lanes.
-///
-/// # Safety
-/// As [`sums_between`].
-#[inline(always)]
-unsafe fn between<S: Groups>([above, below]: Ends) -> S::D {
-    // SAFETY: as the caller's.
-    unsafe {
-        let above = S::sub_d(S::load_d(above[1]), S::load_d(above[0]));
-        S::sub_d(S::sub_d(S::load_d(below[1]), S::load_d(below[0])), above)
-    }
-}
-
-/// [`between`], of four channels of two windows.
-///
-/// # Safety
-/// As [`sums_between`].
-#[inline(always)]
-unsafe fn between_fours<S: Groups>(windows: [Ends; 2]) -> S::D {
-    let at = |row: usize, end: usize| move |window: usize| windows[window][row][end];
-    // SAFETY: as the caller's.
-    unsafe {
-        let above = S::sub_d(S::load_fours_d(at(0, 1)), S::load_fours_d(at(0, 0)));
-        S::sub_d(S::sub_d(S::load_fours_d(at(1, 1)), S::load_fours_d(at(1, 0))), above)
-    }
-}
-
-/// [`between`], of two channels of four windows.
-///
-/// # Safety
-/// As [`sums_between`].
-#[inline(always)]
-unsafe fn between_pairs<S: Groups>(windows: [Ends; 4]) -> S::D {
-    let at = |row: usize, end: usize| move |window: usize| windows[window][row][end];
-    // SAFETY: as the caller's.
-    unsafe {
-        let above = S::sub_d(S::load_pairs_d(at(0, 1)), S::load_pairs_d(at(0, 0)));
-        S::sub_d(S::sub_d(S::load_pairs_d(at(1, 1)), S::load_pairs_d(at(1, 0))), above)
     }
 }
 

@@ -18,7 +18,7 @@ use crate::fast::tiling::reached;
 use crate::methods::Estimate;
 use crate::options::Options;
 use crate::orientation::turn_to_viewpoint;
-use crate::paper::{Cleaned, Marks, marks_from, plain_estimate, window};
+use crate::paper::{Cleaned, Marks, marks_from, plain_estimate};
 use crate::rect::Rect;
 use crate::simd::{GROUP, Groups};
 
@@ -305,12 +305,12 @@ impl Tile<'_> {
         error: f64,
     ) {
         let at = pair * LANES;
-        let (width, height) = (self.points.width(), self.points.height());
+        let size = (self.points.width(), self.points.height());
         let cleaned = Cleaned::new(self.points, self.options);
         let Run { start, radii, sums, points, few, .. } = run;
         let x = *start + at;
         let pixel = |lane: usize| (x + lane, y);
-        let rect = |lane: usize| window(pixel(lane), radii[at + lane] as usize, width, height);
+        let rect = |lane: usize| Rect::around(pixel(lane), radii[at + lane] as usize, size);
         // SAFETY: as the caller's.
         unsafe {
             let around = |lane: usize| (pixel(lane), rect(lane));
