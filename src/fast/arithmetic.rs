@@ -123,6 +123,12 @@ impl<S: Simd> Floats<S> {
     }
 
     #[inline(always)]
+    pub fn min(self, other: Self) -> Self {
+        // SAFETY: there is a group, so there is the instruction set.
+        Floats(unsafe { S::min(self.0, other.0) })
+    }
+
+    #[inline(always)]
     pub fn max(self, other: Self) -> Self {
         // SAFETY: there is a group, so there is the instruction set.
         Floats(unsafe { S::max(self.0, other.0) })

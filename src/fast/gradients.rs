@@ -172,8 +172,8 @@ pub(crate) struct Scale {
 }
 
 /// A normal is doubtful where rounding to integers could turn it by more than this, if one coordinate of each gradient were
-/// as far off as it can be (all three, at worst, turn it by the root of six times as much), or where floats could: (sine of
-/// the angle between the tangents) < 1e-3.
+/// as far off as it can be (all three, at worst, turn it by the root of six times as much; where windows are mirrored at the
+/// image's border, twice that), or where floats could: (sine of the angle between the tangents) < 1e-3.
 const DOUBT: f32 = 1.5e-4;
 const DOUBT_SINE: f32 = 1e-6;
 
@@ -190,7 +190,11 @@ impl Scale {
             bits = bits.min(25.0 - f64::from(limit).log2());
             doubt *= 2.0;
         }
-        let scale = (bits.ceil() - 1.0).clamp(-120.0, 120.0).exp2();
+        let mut scale = (bits.ceil() - 1.0).clamp(-120.0, 120.0).exp2();
+        // Each is rounded by up to one half.
+        if (f64::from(limit) * scale + 0.5) * (strips * side) as f64 >= 31_f64.exp2() {
+            scale *= 0.5;
+        }
         let most = ((31_f64.exp2() / (strips * side) as f64 - 0.5) / scale) as f32;
         Scale { origin, scale: scale as f32, doubt, limit: most.next_down().max(limit) }
     }
@@ -237,6 +241,24 @@ impl Scale {
                 normal: [n[0] * scale, n[1] * scale, n[2] * scale],
                 curvature: Floats::splat(f32::NAN),
                 doubtful: !rounding.max(sine).lt(n2),
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_of_rounded_integers_fit() {
+        for strips in [2, 4] {
+            for side in 1..300 {
+                let limit = ((2048.0 / (strips * side) as f64) as f32).next_down();
+                let scale = Scale::new(strips, limit, side, [0.0; 3]).scale;
+                let most = f64::from(limit * scale).round_ties_even() * (strips * side) as f64;
+                assert!(most < 31_f64.exp2(), "{strips} strips of side {side}");
+                assert!(most > 29_f64.exp2(), "{strips} strips of side {side}: digits to spare");
             }
         }
     }

@@ -442,6 +442,8 @@ impl Noted for Matrices {
                 self.note::<S>(&WindowMoments { sums, share: load(&shares) }, at + group);
             }
         }
+        // SAFETY: as the caller's.
+        unsafe { self.solve::<S>(at, &[lanes]) };
         true
     }
 
@@ -491,11 +493,10 @@ impl Matrices {
             let scale = (Floats::splat(1.0) / trace).widen();
             let (xx, xy, xz) = (xx * scale, xy * scale, xz * scale);
             let (yy, yz, zz) = (yy * scale, yz * scale, zz * scale);
-            let minors = [minor(yy, zz, yz, yz), minor(xx, zz, xz, xz), minor(xx, yy, xy, xy)];
+            let [a_xx, a_xy, a_xz, a_yy, _, a_zz] = adjugate([xx, xy, xz, yy, yz, zz]);
             let c2 = xx + yy + zz;
-            let c1 = minors[0] + minors[1] + minors[2];
-            let others = [minor(xz, yz, xy, zz), minor(xy, yz, xz, yy)];
-            let c0 = (xx * minors[0]).plus(xy, others[0]).plus(xz, others[1]);
+            let c1 = a_xx + a_yy + a_zz;
+            let c0 = (xx * a_xx).plus(xy, a_xy).plus(xz, a_xz);
             self.elements.store::<S>(at, [xx, xy, xz, yy, yz, zz]);
             self.trace.store::<S>(at, [trace]);
             self.polynomial.store::<S>(at, [c0, c1, c2]);
@@ -546,9 +547,7 @@ impl Matrices {
             let ([slope], [trace]) = (self.slope.load::<S>(at), self.trace.load::<S>(at));
             // The adjugate of the matrix less the eigenvalue: each column is along the eigenvector.
             let (xx, yy, zz) = (xx - value, yy - value, zz - value);
-            let (a_xx, a_yy) = (minor(yy, zz, yz, yz), minor(xx, zz, xz, xz));
-            let (a_zz, a_xy) = (minor(xx, yy, xy, xy), minor(xz, yz, xy, zz));
-            let (a_xz, a_yz) = (minor(xy, yz, xz, yy), minor(xy, xz, xx, yz));
+            let [a_xx, a_xy, a_xz, a_yy, a_yz, a_zz] = adjugate([xx, xy, xz, yy, yz, zz]);
             let (a_xx, a_yy, a_zz) = (a_xx.narrow(), a_yy.narrow(), a_zz.narrow());
             let (a_xy, a_xz, a_yz) = (a_xy.narrow(), a_xz.narrow(), a_yz.narrow());
             // The column with the longest diagonal element.
@@ -579,14 +578,22 @@ impl Matrices {
     }
 }
 
+/// [`Symmetric3::adjugate`], its upper triangle.
+#[inline(always)]
+pub(crate) fn adjugate<S: Simd>([xx, xy, xz, yy, yz, zz]: [Doubles<S>; 6]) -> [Doubles<S>; 6] {
+    [
+        minor(yy, zz, yz, yz),
+        minor(xz, yz, xy, zz),
+        minor(xy, yz, xz, yy),
+        minor(xx, zz, xz, xz),
+        minor(xy, xz, xx, yz),
+        minor(xx, yy, xy, xy),
+    ]
+}
+
 /// `a * b - c * d`
 #[inline(always)]
-pub(crate) fn minor<S: Simd>(
-    a: Doubles<S>,
-    b: Doubles<S>,
-    c: Doubles<S>,
-    d: Doubles<S>,
-) -> Doubles<S> {
+fn minor<S: Simd>(a: Doubles<S>, b: Doubles<S>, c: Doubles<S>, d: Doubles<S>) -> Doubles<S> {
     (a * b).minus(c, d)
 }
 

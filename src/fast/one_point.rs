@@ -29,11 +29,16 @@ pub(crate) unsafe fn of_one_point<S: Along>(
     if unsafe { holds_only::<S>(points, &all, first) } {
         return lanes;
     }
-    Bits(lanes).which(|lane| {
+    let mut found = 0;
+    // Not by a closure, which might be compiled without the instruction set.
+    for lane in Bits(lanes) {
         let (pixel, rect) = around(lane);
         // SAFETY: as the caller's.
-        unsafe { holds_only::<S>(points, &rect, pixel) }
-    })
+        if unsafe { holds_only::<S>(points, &rect, pixel) } {
+            found |= 1 << lane;
+        }
+    }
+    found
 }
 
 /// Whether a rectangle holds the pixel's point only, and some that are NaN.

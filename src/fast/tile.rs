@@ -44,34 +44,11 @@ impl<S: Simd> Found<S> {
         self.curvature.take(mask, other.curvature);
     }
 
-    /// Takes, for some lanes of a pair of groups that are doubtful, which is `at` in its run, what their windows give if they are
-    /// summed afresh, as `estimate` says, or else `precisely`; returns the others. `points` are those of a lane's window.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `G`.
+    /// Takes those of some lanes of another; returns which of them are doubtful there.
     #[inline(always)]
-    pub unsafe fn settle<G: Groups<Pair = S>, R: Noted, P: Iterator<Item = [f64; 3]>>(
-        &mut self,
-        mut doubtful: u32,
-        run: &mut R,
-        at: usize,
-        points: impl Fn(usize) -> P,
-        estimate: impl FnOnce(&R) -> Found<S>,
-        precisely: impl Fn(usize) -> Option<Estimate>,
-    ) -> u32 {
-        // SAFETY: as the caller's.
-        unsafe {
-            if run.afresh::<G, P>(at, doubtful, points) {
-                run.solve::<G>(at, &[doubtful]);
-                let fresh = estimate(run);
-                self.take(doubtful, &fresh);
-                doubtful &= fresh.doubtful;
-            }
-            if doubtful == 0 {
-                return 0;
-            }
-            self.take_precise(doubtful, |lane| run.precisely(at + lane).or_else(|| precisely(lane)))
-        }
+    pub fn take_certain(&mut self, lanes: u32, other: &Self) -> u32 {
+        self.take(lanes, other);
+        lanes & other.doubtful
     }
 
     /// Takes those that `precisely` gives for some lanes; returns the others.
@@ -79,12 +56,15 @@ impl<S: Simd> Found<S> {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn take_precise(
+    pub unsafe fn take_precise(
         &mut self,
         lanes: u32,
         precisely: impl Fn(usize) -> Option<Estimate>,
     ) -> u32 {
         const { assert!(S::LANES == LANES) };
+        if lanes == 0 {
+            return 0;
+        }
         let (estimates, left) = all_precise(lanes, precisely);
         // SAFETY: as the caller's; the arrays hold so many lanes each.
         unsafe {
@@ -600,10 +580,14 @@ impl<M: Sums> Row<'_, M> {
             }
             if doubtful != 0 {
                 let points = |lane: usize| tile.points_in(window(lane));
-                let estimate = |run: &_| sums.estimate::<S::Pair>(run, at, sides, true);
-                let precisely = |lane: usize| sums.precisely(tile, window(lane));
-                doubtful =
-                    found.settle::<S, _, _>(doubtful, of_run, at, points, estimate, precisely);
+                if of_run.afresh::<S, _>(at, doubtful, points) {
+                    let fresh = sums.estimate::<S::Pair>(of_run, at, sides, true);
+                    doubtful = found.take_certain(doubtful, &fresh);
+                }
+                doubtful = found.take_precise(doubtful, |lane| {
+                    let precise = of_run.precisely(at + lane);
+                    precise.or_else(|| sums.precisely(tile, window(lane)))
+                });
             }
             let plain = rest & !lanes | doubtful;
             let points = self.planes.rows(self.frame, y);

@@ -13,8 +13,8 @@ const FEW: usize = 16;
 
 /// The image in tiles of like sizes.
 pub(super) struct Tiling {
-    pub width: usize,
-    pub height: usize,
+    width: usize,
+    height: usize,
     pub columns: usize,
     pub rows: usize,
     across: usize,

@@ -58,6 +58,8 @@ pub(crate) struct EvenWindow {
     pub bend2: f32,
 }
 
+const _: () = assert!(size_of::<EvenWindow>() == size_of::<[f32; 12]>());
+
 /// What windows are asked for.
 pub(crate) struct Asked<'a> {
     pub blocks: Blocks,

@@ -33,9 +33,6 @@ pub(super) unsafe fn rows<S: Groups>(
 ) {
     let Blocks { across, .. } = even.asked.blocks;
     let Scratch { concerned, rows: image_rows, candidates } = scratch;
-    // SAFETY: as the caller's.
-    let least_noise = unsafe { Floats::<S::Widest>::splat(even.asked.noise.least) };
-    let mut found = Found { candidates, number: 0, least_noise, noise: least_noise };
     for (row, choices) in rows {
         choices.fill(NO_WINDOW);
         let levels = &even.levels[row * across..][..across];
@@ -57,8 +54,9 @@ pub(super) unsafe fn rows<S: Groups>(
             group.prefetch();
             // SAFETY: as the caller's.
             unsafe {
+                let mut found = Found::<S::Widest>::none(candidates);
                 group.candidates(&mut found);
-                found.weigh();
+                found.weigh(even.asked.noise.least);
                 group.choose(&mut found, image_rows, choices);
             }
         }
@@ -215,9 +213,10 @@ impl<S: Simd> Windows<S> {
     #[inline(always)]
     unsafe fn none() -> Self {
         // SAFETY: as the caller's.
-        let [zero, even] = unsafe { [0.0, f32::INFINITY].map(|value| Floats::splat(value)) };
+        let [zero, per_misfit, even] =
+            unsafe { [0.0, 1.0, f32::INFINITY].map(|value| Floats::splat(value)) };
         let (middle, planes, ray) = ([zero; 2], Planes([zero; 3]), [zero; 3]);
-        let [radius, per_misfit, bend2, jitter] = [zero; 4];
+        let [radius, bend2, jitter] = [zero; 3];
         Windows { middle, radius, planes, ray, per_misfit, bend2, even, jitter }
     }
 
@@ -321,23 +320,20 @@ struct Found<'a, S: Simd> {
     /// Only so many mean something.
     candidates: &'a mut [Candidates],
     number: usize,
-    /// The least variance that is told from none, and the least among the windows.
-    least_noise: Floats<S>,
+    /// The least variance among the windows.
     noise: Floats<S>,
 }
 
-impl<S: Along> Found<'_, S> {
-    /// Starts over.
+impl<'a, S: Along> Found<'a, S> {
+    /// None; there is room for so many.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn start(&mut self) {
-        self.number = 0;
+    unsafe fn none(candidates: &'a mut [Candidates]) -> Self {
         // SAFETY: as the caller's.
-        unsafe {
-            self.noise = Floats::splat(f32::INFINITY);
-        }
+        let noise = unsafe { Floats::splat(f32::INFINITY) };
+        Found { candidates, number: 0, noise }
     }
 
     /// Adds the windows of the blocks in these columns and rows, for the blocks of a mask.
@@ -352,7 +348,6 @@ impl<S: Along> Found<'_, S> {
         rows: &Lines<S>,
         may_take: S::F,
     ) {
-        const { assert!(size_of::<EvenWindow>() == size_of::<[f32; 12]>()) };
         let place = |lane: usize| columns.first[lane] + rows.first[lane];
         let windows = windows.as_ptr();
         let to = &mut self.candidates[self.number];
@@ -409,13 +404,14 @@ impl<S: Along> Found<'_, S> {
         }
     }
 
-    /// Finds what the windows cost any pixel: all have been added.
+    /// Finds what the windows cost any pixel, where a variance of `least_noise` is told from none: all have been added.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn weigh(&mut self) {
-        self.noise = self.noise.max(self.least_noise);
+    unsafe fn weigh(&mut self, least_noise: f32) {
+        // SAFETY: as the caller's.
+        self.noise = self.noise.max(unsafe { Floats::splat(least_noise) });
         for to in &mut self.candidates[..self.number] {
             // SAFETY: as the caller's.
             unsafe {
@@ -512,7 +508,6 @@ impl Group<'_> {
         }
         // SAFETY: as the caller's; all places are inside the image.
         unsafe {
-            found.start();
             let zero = Floats::<S>::splat(0.0);
             let levels = levels.load::<S>();
             let mut radii = Floats::<S>(radii.load::<S>());
@@ -704,7 +699,7 @@ impl Axis {
             S::store_i(first.as_mut_ptr(), S::truncate_i(at.0));
             let middle =
                 |line: Floats<S>| line * Floats::splat(BLOCK as f32) + Floats::splat(MIDDLE as f32);
-            Floats(S::min(middle(at).0, S::splat((self.pixels - 1) as f32))) - middle(own)
+            middle(at).min(Floats::splat((self.pixels - 1) as f32)) - middle(own)
         };
         Lines { first: first.map(|line| line as usize * self.number), from_own }
     }
@@ -717,9 +712,9 @@ impl Axis {
     unsafe fn around<S: Simd>(&self, own: Floats<S>, distance: Floats<S>) -> [Lines<S>; 2] {
         // SAFETY: as the caller's.
         unsafe {
-            let last = S::splat((self.blocks - 1) as f32);
-            let before = Floats(S::max((own - distance).0, S::splat(0.0)));
-            let behind = Floats(S::min((own + distance).0, last));
+            let last = Floats::splat((self.blocks - 1) as f32);
+            let before = (own - distance).max(Floats::splat(0.0));
+            let behind = (own + distance).min(last);
             [self.lines(own, before), self.lines(own, behind)]
         }
     }

@@ -117,7 +117,7 @@ impl ChosenRow<'_> {
                 let (there, none) = (S::mask(lanes), S::splat(f32::NAN));
                 fields = fields.map(|field| S::select(there, field, none));
             }
-            if written.count_ones() as usize == S::LANES {
+            if written == all(S::LANES) {
                 return normals.write_lanes::<S>(x, y, fields);
             }
             let mut found = [[0.0; LANES]; 4];

@@ -9,7 +9,7 @@ use super::tile::{Run, Tile};
 use crate::eigen::Symmetric3;
 use crate::fast::Parts;
 use crate::fast::arithmetic::{Doubles, Floats};
-use crate::fast::moments::minor;
+use crate::fast::moments::adjugate;
 use crate::fast::sink::Sink;
 use crate::fast::tile::{Bits, all};
 use crate::paper::{
@@ -146,7 +146,7 @@ impl<S: Groups> Fits<S> {
         // SAFETY: as the caller's.
         unsafe {
             let most = Floats::splat(TAKEN) * self.points.narrow();
-            let taken = Floats(S::min(S::splat(3.0 * of_image.area), most.0));
+            let taken = Floats::splat(3.0 * of_image.area).min(most);
             self.noise(of_image, taken.max(Floats::splat(3.0)))
         }
     }
@@ -256,7 +256,6 @@ impl<S: Groups> Found<S> {
         noise: &Noise,
         windows: &mut [EvenWindow],
     ) {
-        const { assert!(size_of::<EvenWindow>() == size_of::<[f32; 12]>()) };
         let &Found { best, radii, bend2, .. } = self;
         let ([a, b, c], [x, y, z]) = (best.q, best.ray);
         let mut found = [EvenWindow::default(); GROUP];
@@ -430,8 +429,8 @@ impl EvenTile<'_> {
                 [Floats::<S>::load(wanted.as_ptr()), Floats::load(clean.as_ptr())];
             // As `Asked::largest` has it.
             let limit = Floats::<S>::splat(of_image.limit as f32);
-            let largest = S::min((wanted + wanted).0, S::min(limit.0, clean.0));
-            let largest = Floats(S::and(S::mask(asked), largest));
+            let largest = (wanted + wanted).min(limit.min(clean));
+            let largest = Floats(S::and(S::mask(asked), largest.0));
             let (zero, one) = (Floats::<S>::splat(0.0), Floats::<S>::splat(1.0));
             let least = Doubles::splat(f64::from(of_image.noise.least));
             let area = of_image.noise.area;
@@ -521,10 +520,8 @@ impl EvenTile<'_> {
             for c in 0..3 {
                 m[c] = m[c] + Doubles::splat(origin[c].into());
             }
-            let (axx, axy) = (minor(yy, zz, yz, yz), minor(xz, yz, xy, zz));
-            let (axz, ayy) = (minor(xy, yz, xz, yy), minor(xx, zz, xz, xz));
-            let (ayz, azz) = (minor(xy, xz, xx, yz), minor(xx, yy, xy, xy));
-            let across = times([axx, axy, axz, ayy, ayz, azz], m);
+            let adjugate @ [axx, axy, axz, ..] = adjugate([xx, xy, xz, yy, yz, zz]);
+            let across = times(adjugate, m);
             let along = times([xx, xy, xz, yy, yz, zz], m);
             let (spread, length2, along) = (dot(m, across), dot(m, m), dot(m, along));
             let trace = xx + yy + zz;

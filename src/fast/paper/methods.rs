@@ -258,11 +258,11 @@ impl Sums<4> for SmoothedDepthChanges {
         unsafe {
             let [hx, hy, h_span] = outermost(rects, rings, 0, lanes);
             let [vx, vy, v_span] = outermost(rects, rings, 1, lanes);
-            // Times twice the number of depth changes, which are over two pixels each.
+            // Times twice the number of depth changes, which are over two pixels each: the sums' errors are those of z.
             let (h_count, v_count) = (h_count.narrow(), v_count.narrow());
-            let (h_count, v_count) = (h_count + h_count, v_count + v_count);
-            let (hx, hy, hz) = (hx * h_count, hy * h_count, h.narrow() * h_span);
-            let (vx, vy, vz) = (vx * v_count, vy * v_count, v.narrow() * v_span);
+            let (h_times, v_times) = ((h_count + h_count) / h_span, (v_count + v_count) / v_span);
+            let (hx, hy, hz) = (hx * h_times, hy * h_times, h.narrow());
+            let (vx, vy, vz) = (vx * v_times, vy * v_times, v.narrow());
             run.store::<S>(at, [hx, hy, hz, vx, vy, vz]);
         }
     }

@@ -1,7 +1,8 @@
 //! The paper's windows and methods, fast: depths (`depths`), the radii of the windows of the whole image (`windows`),
 //! then tile by tile, and if need be layer by layer (`layers`), integral images of the method's channels (`integrals`,
-//! `methods`), which points are there (`presence`), the windows' sums (`rects`) and the normals (`tile`). For the second pass (`engine`), its depth changes (`depth_changes`), even windows
-//! (`even_windows`), which of them each pixel takes (`choices`), and their normals written to the pixels (`chosen`).
+//! `methods`), which points are there (`presence`), the windows' sums (`rects`) and the normals (`tile`). For the second
+//! pass (`engine`), its depth changes (`depth_changes`), even windows (`even_windows`), which of them each pixel takes
+//! (`choices`), and their normals written to the pixels (`chosen`).
 
 mod choices;
 mod chosen;

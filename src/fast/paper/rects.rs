@@ -77,7 +77,7 @@ pub(crate) enum Rects<S: Groups> {
 pub(crate) const STEPS: [f32; GROUP] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 impl<S: Groups> Rects<S> {
-    /// The windows of these radii, as `paper::smoothing_area::window` has them, of the row that the rings are aimed at; those
+    /// The windows of these radii, as [`Rect::around`](crate::rect::Rect::around) has them, of the row that the rings are aimed at; those
     /// of other `lanes` mean nothing, but have such radii too. `rows` are those of the last windows that were alike; without,
     /// none are taken for alike.
     ///
@@ -382,7 +382,7 @@ impl Pixels {
         unsafe {
             let steps = Floats::<S>::load(STEPS.as_ptr()) * Floats::whole(self.step);
             let columns = steps + Floats::whole(self.x);
-            Floats(S::min(columns.0, Floats::<S>::whole(self.width - 1).0))
+            columns.min(Floats::whole(self.width - 1))
         }
     }
 }
@@ -401,6 +401,6 @@ pub(crate) unsafe fn range<S: Groups>(
     unsafe {
         let end = at + radii + Floats::splat(1.0);
         let start = (at - radii).max(Floats::splat(0.0));
-        [start, Floats(S::min(end.0, Floats::<S>::whole(count).0))]
+        [start, end.min(Floats::whole(count))]
     }
 }

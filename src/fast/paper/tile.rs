@@ -319,8 +319,10 @@ impl Tile<'_> {
             let mut plain = windows;
             if plain != 0 {
                 let points = |lane: usize| cleaned.finite(rect(lane));
-                let estimate = |run: &_| M::estimate::<S::Pair>(run, at, 0.0);
-                plain = found.settle::<S, _, _>(plain, sums, at, points, estimate, |_| None);
+                if sums.afresh::<S, _>(at, plain, points) {
+                    plain = found.take_certain(plain, &M::estimate::<S::Pair>(sums, at, 0.0));
+                }
+                plain = found.take_precise(plain, |lane| sums.precisely(at + lane));
                 plain |= few[pair] & windows;
             }
             let here = points.load::<S::Pair>(at);

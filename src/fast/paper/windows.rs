@@ -315,7 +315,7 @@ pub(super) unsafe fn is_change<S: Simd>(
     unsafe {
         let least = least_depth_change::<S>(depth, options);
         let (least, difference) = (S::mul(least, gap), S::abs(S::sub(neighbour, depth)));
-        S::or(S::lt(least, difference), S::eq(least, difference))
+        S::le(least, difference)
     }
 }
 
