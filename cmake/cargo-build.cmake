@@ -33,6 +33,10 @@ execute_process(COMMAND ${CARGO} ${arguments} RESULT_VARIABLE result)
 if(NOT result EQUAL 0)
   message(FATAL_ERROR "cargo build failed")
 endif()
+if(NOT EXISTS ${output}/libiine.so)
+  message(FATAL_ERROR "No library in ${output}: where cargo's own configuration sets build.target, name that target with "
+    "-DIINE_RUST_TARGET=...")
+endif()
 
 file(MAKE_DIRECTORY ${LIBRARY_DIR})
 configure_file(${output}/libiine.so ${LIBRARY_DIR}/libiine.so.${VERSION} COPYONLY)

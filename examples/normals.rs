@@ -29,6 +29,7 @@ fn main() -> Result<(), iine::Error> {
 
     let covered = normals.chunks(4).filter(|normal| !normal[0].is_nan()).count();
     println!("{covered} of {} pixels have a normal", width * height);
+    assert!(covered > 0);
     println!("one of them: {:.3?}", &normals[4 * (120 * width + 80)..][..4]);
     Ok(())
 }

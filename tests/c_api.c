@@ -133,6 +133,11 @@ static void test_isa_name(void) {
   if (asked != NULL && (strcmp(asked, "portable") == 0 || strcmp(asked, "scalar") == 0)) {
     CHECK(strcmp(iine_isa_name(), asked) == 0);
   }
+#if defined __x86_64__
+  if (asked != NULL && strcmp(asked, "sse2") == 0) {
+    CHECK(strcmp(iine_isa_name(), asked) == 0);
+  }
+#endif
 }
 
 static void test_status_strings(void) {

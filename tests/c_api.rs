@@ -130,6 +130,7 @@ fn threads_where_the_library_is_unloaded_or_the_process_forked() {
 fn threads_under_valgrind() {
     // It runs this machine's programs only.
     if !runner().is_empty() {
+        println!("skipped: threads_under_valgrind: another machine's programs");
         return;
     }
     if Command::new("valgrind").arg("--version").output().is_err() {

@@ -53,7 +53,7 @@ const PLANE: f32 = 65504.0;
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    if arguments.first().is_some_and(|word| word == "frames") {
+    if arguments.first().is_some_and(|word| word == "count-frames") {
         let number = |k: usize| arguments[k].parse::<usize>().expect("a number");
         let (method, policy) = (Method::ALL[number(3)], BorderPolicy::ALL[number(4)]);
         let metres = |k: usize| arguments[k].parse::<f32>().expect("a number");
@@ -193,7 +193,7 @@ fn count(
             .arg("--tool=callgrind")
             .arg(format!("--callgrind-out-file={}", output.display()))
             .arg(std::env::current_exe().expect("this test's path"))
-            .args(["frames", &number.to_string(), &(semantics as i32).to_string()])
+            .args(["count-frames", &number.to_string(), &(semantics as i32).to_string()])
             .args([(method as i32).to_string(), (policy as i32).to_string()])
             .args([moved, plane, units].map(|metres| metres.to_string()))
             .arg(u8::from(second_pass).to_string())

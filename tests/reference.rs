@@ -175,9 +175,7 @@ impl Differences {
 
     fn check(&mut self, what: &str, method: Method) {
         assert_eq!(self.missing, 0, "{what}: no normal");
-        if self.angles.is_empty() {
-            return;
-        }
+        assert!(!self.angles.is_empty(), "{what}: nothing to compare");
         self.angles.sort_by(f64::total_cmp);
         let percentile = |p: f64| self.angles[((self.angles.len() - 1) as f64 * p) as usize];
         let (p999, worst) = (percentile(0.999), percentile(1.0));
@@ -189,6 +187,7 @@ impl Differences {
         );
         let allowed = if method == Method::CovarianceMatrix { 0.001 } else { 0.01 };
         assert!(p999 <= allowed, "{what}: {p999} deg at p99.9");
+        assert!(worst <= 0.01, "{what}: {worst} deg");
         assert!(self.curvature <= 1e-5, "{what}: curvature {}", self.curvature);
         assert_eq!(self.wrong_side, 0, "{what}: turned away from the viewpoint");
     }

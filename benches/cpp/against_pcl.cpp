@@ -1,5 +1,5 @@
 // iine against PCL, in one process and in alternation: the tables of docs/performance.md, as Markdown.
-// Every configuration is checked before it is timed: the same pixels have a normal, and the angles are PCL's.
+// What is compared with PCL is checked before it is timed: the same pixels have a normal, and the angles are PCL's.
 //
 // usage: against_pcl FRAME.pcd...
 
@@ -110,7 +110,7 @@ alternate (int rounds, const std::vector<std::function<void ()>>& works,
   return medians;
 }
 
-// As many bytes as the normals of a cloud must move at least: 16 in and 32 out a pixel.
+// Copies as many bytes as the points and the normals of a cloud have: 16 and 32 a pixel.
 class Copy
 {
   public:

@@ -1,7 +1,6 @@
-// The drop-in headers alone and twice, together with the class's own.
+// The drop-in header alone and twice, then the class's own.
 #include <pcl/features/integral_image_normal.h>
 #include <pcl/features/integral_image_normal.h>
-#include <pcl/features/impl/integral_image_normal.hpp>
 #include <iine/pcl/integral_image_normal.h>
 
 #ifndef IINE_PCL_DROPIN

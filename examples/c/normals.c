@@ -79,5 +79,5 @@ int main(void) {
   printf("iine %s (%s): %d of %d pixels have a normal; in the middle (%.3f, %.3f, %.3f), curvature %.4f\n",
          iine_version_string(), iine_isa_name(), covered, WIDTH * HEIGHT, cloud[i].nx, cloud[i].ny, cloud[i].nz,
          cloud[i].curvature);
-  return 0;
+  return covered > 0 ? 0 : 1;
 }

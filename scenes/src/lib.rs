@@ -28,7 +28,5 @@ pub use random::Random;
 pub use real::{REAL_FRAMES, real_frame};
 pub use render::{Camera, Frame, NO_SURFACE, Scene};
 pub use shapes::Shape;
-pub use stage::{
-    SCENES, box_on_floor, crease, cylinder, plane, room, scene, sphere, steps, tabletop,
-};
+pub use stage::{SCENES, plane, scene};
 pub use vector::Vector;

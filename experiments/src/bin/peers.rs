@@ -17,9 +17,7 @@ use iine_experiments::table::Row;
 use iine_experiments::{exchange, parallel, ranking, table};
 use iine_scenes::{Camera, Distances, Frame, Noise, Random, SCENES, scene};
 
-/// The noise models, and the seeds of each.
-const NOISES: [(&str, &[u64]); 4] =
-    [("none", &[1]), ("nguyen", &[1]), ("khoshelham", &[1]), ("matched", &[1])];
+const NOISES: [&str; 4] = ["none", "nguyen", "khoshelham", "matched"];
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -46,23 +44,21 @@ fn main() -> ExitCode {
     }
 }
 
-/// A scene under one noise and one seed.
+/// A scene under one noise.
 struct Noisy {
     noise: &'static str,
     file: String,
     frame: Frame,
 }
 
-/// A scene as it is, and under every noise and seed.
+/// A scene as it is, and under every noise.
 fn frames(name: &str) -> Result<(Frame, Vec<Noisy>), String> {
     let exact = scene(name).ok_or(format!("unknown scene: {name}"))?.render(&Camera::default());
     let mut frames = Vec::new();
-    for (noise, seeds) in NOISES {
+    for noise in NOISES {
         let model = Noise::by_name(noise).ok_or(format!("unknown noise: {noise}"))?;
-        for seed in seeds {
-            let frame = model.apply(&exact, &mut Random::new(*seed));
-            frames.push(Noisy { noise, file: format!("{name}-{noise}-{seed}"), frame });
-        }
+        let frame = model.apply(&exact, &mut Random::new(1));
+        frames.push(Noisy { noise, file: format!("{name}-{noise}"), frame });
     }
     Ok((exact, frames))
 }
@@ -78,17 +74,10 @@ fn clouds(name: &str, folder: &Path) -> Result<(), String> {
 fn scores(name: &str, folder: &Path, peer: Option<&str>) -> Result<(), String> {
     let (exact, frames) = frames(name)?;
     let distances = Distances::of(&exact);
-    let mut sums: Vec<(&str, String, [Score; 3])> = Vec::new();
     for noisy in &frames {
         for (who, scores) in scores_of(noisy, &distances, folder, peer)? {
-            match sums.iter_mut().find(|(noise, w, _)| *noise == noisy.noise && *w == who) {
-                Some((.., sum)) => sum.iter_mut().zip(&scores).for_each(|(a, b)| a.add(b)),
-                None => sums.push((noisy.noise, who, scores)),
-            }
+            Row::of(name, noisy.noise, &who, scores).iter().for_each(|row| println!("{row}"));
         }
-    }
-    for (noise, who, scores) in sums {
-        Row::of(name, noise, &who, scores).iter().for_each(|row| println!("{row}"));
     }
     Ok(())
 }

@@ -8,7 +8,7 @@ const USAGE: &str = "\
 usage: make-scene SCENE --output FILE [options]
   --output FILE     the cloud: binary PCD with x y z, missing points NaN
   --truth FILE      the true normals, facing the camera: binary PCD with normal_x normal_y normal_z
-  --noise MODEL     none (default), nguyen, khoshelham, or gaussian-S with S in metres
+  --noise MODEL     none (default), nguyen, khoshelham, matched, or gaussian-S with S in metres
   --dropout P       remove every point with this probability (default 0)
   --seed N          of noise and dropouts (default 1)
   --size WxH        pixels (default 640x480)
