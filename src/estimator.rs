@@ -159,9 +159,9 @@ impl Estimator {
     ///
     /// The window starts at `(x - width / 2, y - height / 2)`; what lies outside the image is clipped, or folded
     /// back with [`BorderPolicy::Mirror`](crate::BorderPolicy::Mirror), which
-    /// [`Semantics::Paper`](crate::Semantics::Paper) does not have. NaN if it gives no normal. If the
-    /// pixel's point is not finite, the normal may point to either side. Takes time proportional to the window, or with
-    /// `zero_is_missing` in PCL's semantics to the cloud.
+    /// [`Semantics::Paper`](crate::Semantics::Paper) does not have. One-sided and crease windows have no effect, nor do they
+    /// make points missing here. NaN if it gives no normal. If the pixel's point is not finite, the normal may point to
+    /// either side. Takes time proportional to the window, or with `zero_is_missing` in PCL's semantics to the cloud.
     /// Errors: as [`Estimator::compute`] but for threads, and [`Error::Index`] if the pixel is outside the cloud.
     pub fn compute_window(
         &mut self,

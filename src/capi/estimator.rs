@@ -151,8 +151,9 @@ pub unsafe extern "C" fn iine_estimator_compute_indices(
 /// The window starts at (x - rect_width / 2, y - rect_height / 2). What lies outside the image is left out with
 /// IINE_BORDER_POLICY_IGNORE and folded back with IINE_BORDER_POLICY_MIRROR. NaN is written where the window gives no
 /// normal, as one of size 0 never does. Where the pixel's point is not finite, the normal may point to either side. The
-/// border policy has no effect with IINE_SEMANTICS_PAPER. Takes time proportional to the window's area, or, with missing
-/// zeros in PCL's semantics, to the cloud's.
+/// border policy has no effect with IINE_SEMANTICS_PAPER; one-sided and crease windows have none at all, nor do they make
+/// points missing here. Takes time proportional to the window's area, or, with missing zeros in PCL's semantics, to the
+/// cloud's.
 ///
 /// Errors: as `iine_estimator_compute` but for IINE_ERROR_THREADS, IINE_ERROR_INDEX if the pixel is outside the cloud, and
 /// IINE_ERROR_OPTION_VALUE if a size is negative. Nothing is written then.
