@@ -31,7 +31,8 @@ pub enum Error {
     /// An index is negative or not below width x height.
     Index = 9,
     /// Memory could not be allocated; where some bytes are missing to start threads or hand them work, or for the second pass
-    /// over less than three columns or rows, the process may be aborted instead. Nothing is written then, or NaN everywhere where depths in the middle of a frame turn out to need more memory than there is.
+    /// over less than three columns or rows, the process may be aborted instead. Nothing is written then, or NaN everywhere
+    /// where depths in the middle of a frame turn out to need more memory than there is.
     OutOfMemory = 10,
     /// The worker threads asked for could not be started.
     Threads = 11,

@@ -180,8 +180,8 @@ impl Estimator {
         normal.check_disjoint(points)?;
         let size = (width as usize, height as usize);
         // The paper's methods leave zeros out themselves.
-        let is_cleaned = self.options.semantics == Semantics::Pcl && self.options.zero_is_missing;
-        let cleaned = is_cleaned.then(|| Cloud::new(points, &self.options)).transpose()?;
+        let is_asked = self.options.semantics == Semantics::Pcl && self.options.zero_is_missing;
+        let cleaned = self.cleaned(points, is_asked)?;
         let cleaned = cleaned.as_ref().map(Cloud::view);
         let found = of_window(cleaned.as_ref().unwrap_or(points), &self.options, (x, y), size);
         let found = turn_to_viewpoint(found, points.at(x, y), self.options.viewpoint);
@@ -223,8 +223,7 @@ impl Estimator {
 
     /// Writes the maps but that of the depth changes, which is returned.
     fn maps_of_pcl(&self, points: &Points, maps: &mut Maps) -> Result<Vec<bool>, Error> {
-        let cleaned = || Cloud::new(points, &self.options);
-        let cleaned = self.options.is_beyond_pcl().then(cleaned).transpose()?;
+        let cleaned = self.cleaned(points, self.options.is_beyond_pcl())?;
         let cleaned = cleaned.as_ref().map(Cloud::view);
         let plain = Plain::new(cleaned.as_ref().unwrap_or(points), &self.options)?;
         let eigenvalues = maps.eigenvalues.is_some().then(|| plain.eigenvalue_map());
@@ -236,6 +235,11 @@ impl Estimator {
             }
         }
         Ok(plain.depth_changes)
+    }
+
+    /// A copy of the points in which the missing ones are NaN, if it is asked for.
+    fn cleaned(&self, points: &Points, is_asked: bool) -> Result<Option<Cloud>, Error> {
+        is_asked.then(|| Cloud::new(points, &self.options)).transpose()
     }
 
     /// As [`Estimator::maps_of_pcl`].

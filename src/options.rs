@@ -205,8 +205,8 @@ pub struct Options {
     /// Takes points at (0, 0, 0) as missing, as LiDARs and some depth cameras write them; default off.
     pub zero_is_missing: bool,
     /// Gives pixels near a depth change a window on their own side of it, so that every pixel with two neighbours on its
-    /// surface that are not in line with it has a normal; default off. Takes [`PaperOptions::alpha`], [`PaperOptions::gamma`] and
-    /// [`PaperOptions::largest_radius`] in either semantics.
+    /// surface that are not in line with it has a normal; default off. Takes [`PaperOptions::alpha`],
+    /// [`PaperOptions::gamma`] and [`PaperOptions::largest_radius`] in either semantics.
     pub one_sided_windows: bool,
     /// In a second pass gives every pixel, but on round surfaces, that window around or beside it whose plane is expected to be
     /// nearest to the surface (docs/paper.md), so that edges without a depth change stay sharp and flat surfaces become

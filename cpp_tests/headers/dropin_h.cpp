@@ -1,6 +1,7 @@
-// The drop-in header alone and twice, then the class's own.
+// The drop-in header alone and twice, then its implementation's and the class's own.
 #include <pcl/features/integral_image_normal.h>
 #include <pcl/features/integral_image_normal.h>
+#include <pcl/features/impl/integral_image_normal.hpp>
 #include <iine/pcl/integral_image_normal.h>
 
 #ifndef IINE_PCL_DROPIN

@@ -92,8 +92,8 @@ pub unsafe extern "C" fn iine_estimator_set_border_policy(
 
 /// Sets the smoothing size in pixels: finite, above 0; default 10. The side of a pixel's window is
 /// min(distance to the nearest depth change, smoothing size) rounded down; where that minimum is not above 2 there is no
-/// normal. Depth-dependent smoothing adds to the size; without it, sizes up to 2 give no
-/// normals but those of one-sided windows.
+/// normal. Depth-dependent smoothing adds to the size; without it, sizes up to 2 give no normals but
+/// those of one-sided windows.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE.
 ///
@@ -180,8 +180,8 @@ pub unsafe extern "C" fn iine_estimator_set_viewpoint(
 /// Sets the number of threads: 1 (the default) computes on the calling thread, 0 takes one per processor. The result
 /// does not depend on it, bit for bit. They are started by the next computation, and live until another number is asked
 /// for, the scratch memory is released or the estimator is freed; a fork of the process starts its own with its next
-/// computation. Where memory for starting them or handing them work is missing, the process may be aborted. On Linux they keep off the core that
-/// the calling thread is on, if they may run on as many cores as there are threads.
+/// computation. Where memory for starting them or handing them work is missing, the process may be aborted. On Linux they
+/// keep off the core that the calling thread is on, if they may run on as many cores as there are threads.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE above 1024.
 ///
@@ -398,8 +398,8 @@ pub unsafe extern "C" fn iine_estimator_set_one_sided_windows(
 
 /// Whether a second pass gives every pixel, but on round surfaces, that window around or beside it whose plane is expected to
 /// be nearest to the surface (docs/paper.md), so that edges without a depth change stay sharp and flat surfaces become
-/// smoother: 0 (the default) or 1. With either semantics; takes alpha from `iine_estimator_set_paper_alpha`, and no window's radius is above the largest of
-/// `iine_estimator_set_paper_radii`.
+/// smoother: 0 (the default) or 1. With either semantics; takes alpha from `iine_estimator_set_paper_alpha`, and no window's
+/// radius is above the largest of `iine_estimator_set_paper_radii`.
 ///
 /// Errors: IINE_ERROR_NULL_POINTER, IINE_ERROR_OPTION_VALUE for any other number.
 ///

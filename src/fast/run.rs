@@ -131,8 +131,9 @@ pub(crate) trait Noted: Default {
     #[inline(always)]
     unsafe fn solve<S: Groups>(&mut self, _at: usize, _lanes: &[u32]) {}
 
-    /// Notes and solves windows of some lanes of the pair of groups from `at` on anew, without the rings' rounding; returns whether: else
-    /// they are left to the plain form. What was noted of the pair before is lost. `points` gives those of a lane's window.
+    /// Notes and solves windows of some lanes of the pair of groups from `at` on anew, without the rings' rounding; returns
+    /// whether: else they are left to the plain form. What was noted of the pair before is lost. `points` gives those of a
+    /// lane's window.
     ///
     /// # Safety
     /// As [`Noted::solve`].
