@@ -11,7 +11,7 @@ use std::sync::OnceLock;
 pub enum Isa {
     /// The specification: walks over every window.
     Scalar,
-    /// The fast path without any instruction set.
+    /// The fast path without any instruction set, on processors that have none of the others.
     Portable,
     /// SSE2, on every x86-64.
     Sse2,
@@ -47,7 +47,8 @@ impl Isa {
     /// Whether this processor has it.
     pub fn is_available(self) -> bool {
         match self {
-            Isa::Scalar | Isa::Portable => true,
+            Isa::Scalar => true,
+            Isa::Portable => !cfg!(any(target_arch = "x86_64", target_arch = "aarch64")),
             #[cfg(target_arch = "x86_64")]
             Isa::Sse2 => true,
             #[cfg(target_arch = "x86_64")]
@@ -62,7 +63,6 @@ impl Isa {
             }
             #[cfg(target_arch = "aarch64")]
             Isa::Neon => true,
-            #[allow(unreachable_patterns)]
             _ => false,
         }
     }

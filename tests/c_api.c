@@ -123,6 +123,13 @@ static void test_version(void) {
 
 static void test_isa_name(void) {
   static const char *const names[] = {"avx512", "avx2", "sse2", "neon", "portable", "scalar"};
+#if defined __x86_64__
+  static const char least[] = "sse2";
+#elif defined __aarch64__
+  static const char least[] = "neon";
+#else
+  static const char least[] = "portable";
+#endif
   const char *const asked = getenv("IINE_ISA");
   size_t i, found = 0;
   for (i = 0; i < sizeof names / sizeof *names; ++i) {
@@ -130,14 +137,9 @@ static void test_isa_name(void) {
   }
   CHECK(found == 1);
   /* What every processor has is taken if it is asked for. */
-  if (asked != NULL && (strcmp(asked, "portable") == 0 || strcmp(asked, "scalar") == 0)) {
+  if (asked != NULL && (strcmp(asked, "scalar") == 0 || strcmp(asked, least) == 0)) {
     CHECK(strcmp(iine_isa_name(), asked) == 0);
   }
-#if defined __x86_64__
-  if (asked != NULL && strcmp(asked, "sse2") == 0) {
-    CHECK(strcmp(iine_isa_name(), asked) == 0);
-  }
-#endif
 }
 
 static void test_status_strings(void) {
@@ -458,8 +460,8 @@ static void test_compute_refuses(void) {
     iine_normals normals[2];
     char bytes[1];
   } place;
-  const iine_points *const odd_points = (const iine_points *)(const void *)(place.bytes + 4);
-  const iine_normals *const odd_normals = (const iine_normals *)(const void *)(place.bytes + 4);
+  const iine_points *const odd_points = (const iine_points *)(const void *)(place.bytes + 2);
+  const iine_normals *const odd_normals = (const iine_normals *)(const void *)(place.bytes + 2);
   memset(&place, 0, sizeof place);
 
   refuse(IINE_ERROR_NULL_POINTER, NULL, &good_points, &good_normals, __LINE__);

@@ -14,8 +14,16 @@ fn library(name: &str) -> PathBuf {
     test.with_file_name(name)
 }
 
+/// The processor in the name of this test's platform.
+fn processor() -> &'static str {
+    match std::env::consts::ARCH {
+        "x86" => "i686",
+        other => other,
+    }
+}
+
 fn compiler() -> cc::Tool {
-    let target = format!("{}-unknown-linux-gnu", std::env::consts::ARCH);
+    let target = format!("{}-unknown-linux-gnu", processor());
     let host = "x86_64-unknown-linux-gnu";
     let host = if Path::new("/lib64/ld-linux-x86-64.so.2").exists() { host } else { &target };
     cc::Build::new().cargo_metadata(false).opt_level(1).target(&target).host(host).get_compiler()
@@ -23,7 +31,7 @@ fn compiler() -> cc::Tool {
 
 /// Cargo's runner for this test's platform, if there is one.
 fn runner() -> String {
-    let runner = format!("CARGO_TARGET_{}_UNKNOWN_LINUX_GNU_RUNNER", std::env::consts::ARCH);
+    let runner = format!("CARGO_TARGET_{}_UNKNOWN_LINUX_GNU_RUNNER", processor());
     std::env::var(runner.to_uppercase()).unwrap_or_default()
 }
 
@@ -64,6 +72,9 @@ fn compile(
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let program = directory.join("program");
     let mut command = compiler().to_command();
+    if processor() == "i686" {
+        command.args(["-msse2", "-mfpmath=sse"]); // floats round to floats, as everywhere else
+    }
     command
         .args(language)
         .args(["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-I"])

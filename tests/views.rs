@@ -24,7 +24,8 @@ fn points_that_do_not_fit_are_refused() {
         let found = Points::interleaved(&data, WIDTH, HEIGHT, stride, row);
         assert_eq!(found.err(), Some(Error::Stride), "{stride} {row}");
     }
-    for (width, height) in [(0, 1), (1, 0), (usize::MAX, 1), (1, usize::MAX), (1 << 40, 1 << 40)] {
+    const LARGE: usize = 1 << (usize::BITS / 2 + 1); // its square is no usize
+    for (width, height) in [(0, 1), (1, 0), (usize::MAX, 1), (1, usize::MAX), (LARGE, LARGE)] {
         let found = Points::interleaved(&data, width, height, 3, 0);
         assert_eq!(found.err(), Some(Error::Size), "{width} {height}");
     }

@@ -2,7 +2,6 @@
 
 use crate::isa::Isa;
 use crate::simd::Groups;
-use crate::simd::portable::Portable;
 #[cfg(target_arch = "x86_64")]
 use crate::simd::{
     avx512::Avx512,
@@ -30,7 +29,8 @@ macro_rules! path {
     };
 }
 
-path!(portable, Portable);
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+path!(portable, crate::simd::portable::Portable);
 #[cfg(target_arch = "x86_64")]
 path!(sse2, Sse2);
 #[cfg(target_arch = "x86_64")]
@@ -47,13 +47,14 @@ pub(super) unsafe fn run<T: Task>(isa: Isa, task: T) -> T::Output {
     unsafe {
         match isa {
             #[cfg(target_arch = "x86_64")]
-            Isa::Sse2 => sse2(task),
+            Isa::Avx512 => avx512(task),
             #[cfg(target_arch = "x86_64")]
             Isa::Avx2 => avx2(task),
             #[cfg(target_arch = "x86_64")]
-            Isa::Avx512 => avx512(task),
+            _ => sse2(task),
             #[cfg(target_arch = "aarch64")]
-            Isa::Neon => neon(task),
+            _ => neon(task),
+            #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
             _ => portable(task),
         }
     }

@@ -4,43 +4,13 @@
 //! path is compiled for its instruction set. No operation reorders, and products are fused with sums only where that is
 //! asked for: so all paths that fuse give the same bits, and so do all that cannot.
 
-/// Applies an intrinsic to each of a group's registers: written out, as compilers take minutes over so many small
-/// loops.
-macro_rules! each {
-    ([$($i:literal)+] $op:path, $a:expr) => {{
-        let a = $a;
-        [$($op(a[$i])),+]
-    }};
-    ([$($i:literal)+] $op:path, $a:expr, $b:expr) => {{
-        let (a, b) = ($a, $b);
-        [$($op(a[$i], b[$i])),+]
-    }};
-    ([$($i:literal)+] $op:path, $a:expr, $b:expr, $c:expr) => {{
-        let (a, b, c) = ($a, $b, $c);
-        [$($op(a[$i], b[$i], c[$i])),+]
-    }};
-    (2 $op:path, $($operand:expr),+) => { each!([0 1] $op, $($operand),+) };
-    (4 $op:path, $($operand:expr),+) => { each!([0 1 2 3] $op, $($operand),+) };
-}
+#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+#[macro_use]
+mod registers;
 
-/// Methods that call one function each, of all of a group or, `of N` registers, of each.
-macro_rules! calls {
-    (of $n:tt: $($name:ident($($operand:ident: $type:ty),*) -> $result:ty = $function:path;)*) => {
-        $(#[inline(always)]
-        unsafe fn $name($($operand: $type),*) -> $result {
-            unsafe { each!($n $function, $($operand),*) }
-        })*
-    };
-    ($($name:ident($($operand:ident: $type:ty),*) $(-> $result:ty)? = $function:path;)*) => {
-        $(#[inline(always)]
-        unsafe fn $name($($operand: $type),*) $(-> $result)? {
-            unsafe { $function($($operand),*) }
-        })*
-    };
-}
-
+#[cfg(any(test, not(any(target_arch = "x86_64", target_arch = "aarch64"))))]
 pub(crate) mod portable;
-#[cfg(test)]
+#[cfg(all(test, any(target_arch = "x86_64", target_arch = "aarch64")))]
 mod tests;
 pub(crate) mod twice;
 
@@ -264,6 +234,7 @@ unsafe fn load_points_by_fours<S: Along>(first: *const f32, step: usize) -> [S::
 ///
 /// # Safety
 /// As [`Simd`].
+#[cfg(any(test, not(target_arch = "x86_64")))]
 #[inline(always)]
 unsafe fn store_points_by_lanes<S: Simd>(
     fields: [S::F; 4],
