@@ -179,7 +179,8 @@ impl Estimator {
         }
         normal.check_disjoint(points)?;
         // No larger than pointers of 32 bits can be added to; no image is half as large.
-        let [width, height] = [width, height].map(|side| (side as usize).min(isize::MAX as usize / 2));
+        let [width, height] =
+            [width, height].map(|side| (side as usize).min(isize::MAX as usize / 2));
         let size = (width, height);
         // The paper's methods leave zeros out themselves.
         let is_asked = self.options.semantics == Semantics::Pcl && self.options.zero_is_missing;

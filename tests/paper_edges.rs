@@ -3,8 +3,8 @@
 
 mod clouds;
 
-use clouds::angle;
-use iine::{Depth, Estimator, Method, Normals, Options, Points, Semantics};
+use clouds::{Cloud, angle, compute, fast_isas};
+use iine::{BorderPolicy, Depth, Estimator, Isa, Method, Normals, Options, Points, Semantics};
 use iine_scenes::{
     Band, Camera, Distances, Frame, Noise, Pcd, REAL_FRAMES, Random, Scene, Shape, real_frame,
     scene,
@@ -476,6 +476,54 @@ fn points_in_line_have_no_normal() {
                     }
                 }
             }
+        }
+    }
+}
+
+/// Where no difference of depth is allowed at all, points of one plane are none apart.
+#[test]
+fn points_in_a_plane_lie_in_its_windows() {
+    let (width, height) = (37, 30);
+    let point = |at: usize| {
+        let [x, y] = [at % width, at / width].map(|place| place as f32 / 60.0 * 1.7);
+        [x - 0.5, y - 0.4, 1.7]
+    };
+    let cloud = Cloud { width, height, points: (0..width * height).map(point).collect() };
+    for isa in fast_isas().chain([Isa::Scalar]) {
+        let mut options = options(Method::AverageDepthChange, false, true);
+        options.semantics = Semantics::Pcl;
+        options.border_policy = BorderPolicy::Mirror;
+        options.normal_smoothing_size = 3.0;
+        options.max_depth_change_factor = 0.0;
+        [options.paper.smallest_radius, options.paper.least_depth_radius] = [1; 2];
+        options.paper.largest_radius = 1;
+        let found = compute(&mut Estimator::with_isa(options, isa), &cloud);
+        assert!(found.iter().all(|normal| normal[2] == -1.0), "{isa:?}");
+    }
+}
+
+/// Steps so fine that windows' planes are far from the points: no eigenvalue's share, but in its range.
+#[test]
+fn curvatures_are_in_their_range() {
+    let (width, height) = (42, 30);
+    let steps = [(0.05, 4, 500.0, 5.0), (0.5, 1, 500.0, 200.0), (3.0, 4, 60.0, 200.0)];
+    for (step, side, focal, gamma) in steps {
+        let point = |at: usize| {
+            let (x, y) = (at % width, at / width);
+            let z = 1.0 + if (x / side + y / side) % 2 == 0 { 0.0 } else { step };
+            [(x as f32 - 20.0) / focal * z, (y as f32 - 15.0) / focal * z, z]
+        };
+        let cloud = Cloud { width, height, points: (0..width * height).map(point).collect() };
+        let isas: Vec<Isa> = fast_isas().chain([Isa::Scalar]).collect();
+        for number in 0..4 * isas.len() {
+            let (isa, one_sided) = (isas[number / 4], number % 2 == 0);
+            let semantics = Semantics::ALL[number / 2 % 2];
+            let mut options = options(Method::CovarianceMatrix, one_sided, !one_sided);
+            (options.semantics, options.paper.gamma) = (semantics, gamma);
+            let found = compute(&mut Estimator::with_isa(options, isa), &cloud);
+            let is_out = |c: f32| !c.is_nan() && !(0.0..=0.33334).contains(&c);
+            let out = found.iter().find(|normal| is_out(normal[3]));
+            assert_eq!(out, None, "step {step}, {semantics:?}, one-sided {one_sided}, {isa:?}");
         }
     }
 }

@@ -144,23 +144,30 @@ impl LaneOrder {
     }
 
     /// Writes elements in lane order as a row of floats. `row` has room for all lanes, also those past the width.
+    ///
+    /// # Safety
+    /// The processor has the instruction set of `S`.
     #[inline(always)]
-    pub fn write(&self, from: &[Lanes], row: &mut [f32]) {
-        let (from, row) = (&from[..self.segment], &mut row[..self.segment * LANES]);
-        let whole = self.segment / 4 * 4;
+    pub unsafe fn write<S: Along>(&self, from: &[Lanes], row: &mut [f32]) {
+        let segment = self.segment;
+        let (from, row) = (&from[..segment], &mut row[..segment * LANES]);
+        let whole = segment / 4 * 4;
         for element in (0..whole).step_by(4) {
-            for lane in (0..LANES).step_by(4) {
-                // SAFETY: 4 elements of 4 lanes lie inside `from`; 4 floats of 4 segments inside `row`.
+            for lane in (0..LANES).step_by(S::LANES) {
+                // SAFETY: as the caller's; 4 elements lie inside `from`, and 4 floats of all segments inside `row`.
                 unsafe {
-                    let from = from.as_ptr().add(element).cast::<f32>().add(lane);
-                    let to = row.as_mut_ptr().add(lane * self.segment + element);
-                    transpose4(from, LANES, to, self.segment);
+                    let load = |i: usize| S::load(from[element + i].0.as_ptr().add(lane));
+                    let of_lanes = S::transpose_fours([load(0), load(1), load(2), load(3)]);
+                    let to = row.as_mut_ptr().add(lane * segment + element);
+                    for i in 0..4 {
+                        S::store_fours(of_lanes[i], |four| to.add((4 * four + i) * segment));
+                    }
                 }
             }
         }
-        for element in whole..self.segment {
+        for element in whole..segment {
             for lane in 0..LANES {
-                row[lane * self.segment + element] = from[element].0[lane];
+                row[lane * segment + element] = from[element].0[lane];
             }
         }
     }
@@ -170,33 +177,4 @@ impl LaneOrder {
 #[inline(always)]
 fn finite_or_nan(z: f32) -> f32 {
     if z.is_finite() { z } else { f32::NAN }
-}
-
-/// Transposes 4 x 4 floats; the strides of the rows count floats.
-///
-/// # Safety
-/// `from` is valid for reads, `to` for writes of four floats at each of four rows.
-#[inline(always)]
-unsafe fn transpose4(from: *const f32, from_stride: usize, to: *mut f32, to_stride: usize) {
-    // SAFETY: promised by the caller; SSE is part of every x86-64.
-    #[cfg(target_arch = "x86_64")]
-    unsafe {
-        use std::arch::x86_64::*;
-        let [a, b, c, d] = [0, 1, 2, 3].map(|row| _mm_loadu_ps(from.add(row * from_stride)));
-        let (ab_low, cd_low) = (_mm_unpacklo_ps(a, b), _mm_unpacklo_ps(c, d));
-        let (ab_high, cd_high) = (_mm_unpackhi_ps(a, b), _mm_unpackhi_ps(c, d));
-        _mm_storeu_ps(to, _mm_movelh_ps(ab_low, cd_low));
-        _mm_storeu_ps(to.add(to_stride), _mm_movehl_ps(cd_low, ab_low));
-        _mm_storeu_ps(to.add(2 * to_stride), _mm_movelh_ps(ab_high, cd_high));
-        _mm_storeu_ps(to.add(3 * to_stride), _mm_movehl_ps(cd_high, ab_high));
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    for row in 0..4 {
-        for column in 0..4 {
-            // SAFETY: promised by the caller.
-            unsafe {
-                to.add(column * to_stride + row).write(from.add(row * from_stride + column).read())
-            };
-        }
-    }
 }

@@ -205,7 +205,7 @@ struct WindowRows<'a> {
 struct Sweep {
     /// A ring of two rows of depths in lane order, each with an element more for the following segments' first pixels.
     z: Buffer<Lanes>,
-    /// Masks: where the pixel has a right neighbour, and where there is a depth change from the one above.
+    /// Masks: where the pixel's neighbours are tested, and where there is a depth change from the one above.
     tested: Buffer<Lanes>,
     above: Buffer<Lanes>,
     sides: Buffer<Lanes>,
@@ -319,20 +319,16 @@ impl<'a> WindowRows<'a> {
         // SAFETY: as the caller's.
         unsafe { sweep.read_z::<S>(points, order, before) };
         for y in before..rows.end {
-            let last = y + 1 == points.height();
-            if !last {
+            if y + 1 < points.height() {
                 // SAFETY: as the caller's.
                 unsafe { sweep.read_z::<S>(points, order, y + 1) };
+            } else {
+                // Of the last row no neighbours are tested; the row above was tested against it.
+                sweep.tested.fill(Lanes::ZERO);
             }
             let row = &mut self.row(y.max(rows.start))[1..];
             // SAFETY: as the caller's.
-            let depths = unsafe {
-                if last {
-                    sweep.start_last_row::<S::Pair>(order, y, far, row)
-                } else {
-                    sweep.start_row::<S::Pair>(points, order, y, factor, row)
-                }
-            };
+            let depths = unsafe { sweep.start_row::<S::Pair>(points, order, y, factor, row) };
             swept[y] = Swept { depths, side: 0.0 };
             if y > self.first {
                 let (above, row) = self.two_rows(y - 1);
@@ -379,7 +375,7 @@ impl<'a> WindowRows<'a> {
                     if smoothing.is_none() {
                         sweep.read_z::<S>(points, order, y);
                     }
-                    sweep.sides::<S::Pair>(points, options, smoothing, y, order, row)
+                    sweep.sides::<S>(points, options, smoothing, y, order, row)
                 };
             }
         }
@@ -448,39 +444,13 @@ impl Sweep {
         }
     }
 
-    /// The image's last row: only the row above was tested against it.
-    ///
-    /// # Safety
-    /// As [`Sweep::start_row`].
-    #[inline(always)]
-    unsafe fn start_last_row<S: Simd>(
-        &self,
-        order: LaneOrder,
-        y: usize,
-        far: f32,
-        row: &mut [Lanes],
-    ) -> [f32; 2] {
-        let z = &self.z[Self::z_place(order, y)];
-        // SAFETY: as the caller's.
-        unsafe {
-            let mut range = Swept::NOTHING.depths.map(|depth| S::splat(depth));
-            for k in 0..order.segment {
-                let (above, own) = (self.above[k].load::<S>(), z[k].load::<S>());
-                row[k].store::<S>(S::and_not(above, S::splat(far)));
-                range = widened::<S>(range, own);
-            }
-            let [least, largest] = range;
-            [Floats::<S>(least).least(), Floats::<S>(largest).largest()]
-        }
-    }
-
     /// Replaces a row's distances by the sides of its windows, pixel by pixel; none is larger than what is returned.
     /// `smoothing` as [`one_smoothing`] says; if there is none, the row's depths have been read.
     ///
     /// # Safety
-    /// As [`Sweep::start_row`].
+    /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn sides<S: Simd>(
+    unsafe fn sides<S: Groups>(
         &mut self,
         points: &Points,
         options: &Options,
@@ -494,28 +464,30 @@ impl Sweep {
         let (distances, sides) = (&row[1..=segment], &mut self.sides[..segment]);
         // SAFETY: as the caller's.
         let largest = unsafe {
-            let mut so_far = S::splat(0.0);
+            let mut so_far = S::Pair::splat(0.0);
             if let Some(smoothing) = smoothing {
-                let smoothing = S::splat(smoothing);
+                let smoothing = S::Pair::splat(smoothing);
                 for k in 0..segment {
-                    let side = side::<S>(distances[k].load::<S>(), smoothing);
-                    so_far = S::max(side, so_far);
-                    sides[k].store::<S>(side);
+                    let side = side::<S::Pair>(distances[k].load::<S::Pair>(), smoothing);
+                    so_far = S::Pair::max(side, so_far);
+                    sides[k].store::<S::Pair>(side);
                 }
             } else {
-                let (size, ten) = (S::splat(options.normal_smoothing_size), S::splat(10.0));
+                let (size, ten) =
+                    (S::Pair::splat(options.normal_smoothing_size), S::Pair::splat(10.0));
                 for k in 0..segment {
                     points.prefetch(y.wrapping_sub(1), k * LANES, LANES);
-                    let smoothing = S::add(size, S::div(z[k].load::<S>(), ten));
-                    let side = side::<S>(distances[k].load::<S>(), smoothing);
-                    so_far = S::max(side, so_far);
-                    sides[k].store::<S>(side);
+                    let smoothing = S::Pair::add(size, S::Pair::div(z[k].load::<S::Pair>(), ten));
+                    let side = side::<S::Pair>(distances[k].load::<S::Pair>(), smoothing);
+                    so_far = S::Pair::max(side, so_far);
+                    sides[k].store::<S::Pair>(side);
                 }
             }
-            Floats::<S>(so_far).largest()
+            Floats::<S::Pair>(so_far).largest()
         };
         let row = floats_mut(row);
-        order.write(&self.sides, row);
+        // SAFETY: as the caller's.
+        unsafe { order.write::<S::Widest>(&self.sides, row) };
         // The one pixel whose own depth nobody tests.
         if y + 1 == points.height() && !points.z(order.width - 1, y).is_finite() {
             row[order.width - 1] = 0.0;

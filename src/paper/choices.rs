@@ -8,6 +8,8 @@
 //! Blocks are seldom on more than two surfaces, so two of a block's pixels choose for all: the middle one, and the one
 //! to which the window of the middle one is worth least.
 
+use std::ops::{Add, Mul};
+
 use super::blocks::{BLOCK, Blocks, MIDDLE, lines_around};
 use super::cloud::Cloud;
 use super::even_windows::{Asked, EvenWindow};
@@ -287,7 +289,7 @@ impl<'a> Candidates<'a> {
         let even = even + window.bend2 * (dx * dx + dy * dy);
         let cost = (even + astray * window.per_misfit()) * (1.0 + short * short);
         let lies_in =
-            || (pixel.inverse_depth - plane).abs() < pixel.tolerance + JITTER * window.steepness;
+            || (pixel.inverse_depth - plane).abs() <= pixel.tolerance + JITTER * window.steepness;
         if short == 0.0 || lies_in() { cost } else { f32::INFINITY }
     }
 
@@ -341,7 +343,11 @@ fn length([dx, dy]: [f32; 2]) -> f32 {
 }
 
 /// The inverse depth along a ray of the plane q P = 1, or how far a plane's is above another's, of which q is the difference.
-fn inverse_depth_along(q: [f32; 3], ray: [f32; 3]) -> f32 {
+#[inline(always)]
+pub(crate) fn inverse_depth_along<T: Copy + Mul<Output = T> + Add<Output = T>>(
+    q: [T; 3],
+    ray: [T; 3],
+) -> T {
     dot(q, ray)
 }
 

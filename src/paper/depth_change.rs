@@ -13,10 +13,12 @@ use std::ops::Range;
 
 use super::blocks::{BLOCK, Blocks};
 use super::cloud::Cloud;
+use super::is_depth_change;
 use super::marks::{Marks, WORD, around, bits, columns, mark};
 use super::planes::{JITTER, Plane, inverse_depth};
 use crate::Error;
 use crate::memory::{bytes, refill, table};
+use crate::options::Options;
 use crate::rect::Rect;
 use crate::threads::Workers;
 
@@ -58,14 +60,13 @@ impl DepthChanges {
         marks + bytes(steps) + bytes(clean_radii)
     }
 
-    /// Becomes the changes of a cloud: `is_change(depth, difference, gap)` says whether a difference in depth to the
-    /// neighbour `gap` pixels to the right or below is one; no NaN is. `between` is [`between`], or does the same.
+    /// Becomes the changes of a cloud. `between` is [`between`], or does the same.
     pub fn find(
         &mut self,
         cloud: &Cloud,
+        options: &Options,
         workers: &Workers,
         between: impl Fn([&[f32]; 2], [&mut [u64]; 2]) + Sync,
-        is_change: impl Fn(f32, f32, usize) -> bool + Sync,
     ) -> Result<(), Error> {
         let &Cloud { width, height, ref depths, .. } = cloud;
         // No pixel is known to be spoilt so far: there is room for what is behind gaps.
@@ -86,7 +87,7 @@ impl DepthChanges {
                     let at = behind.start + x;
                     let is_change = cloud.gap(at, axis).is_some_and(|gap| {
                         let before = depths[at - gap * [1, width][axis]];
-                        is_change(before, depths[at] - before, gap)
+                        is_depth_change(before, depths[at] - before, gap, options)
                     });
                     mark(changes, x, is_change.into());
                 }
@@ -273,17 +274,17 @@ fn slope(cloud: &Cloud, rect: &Rect, axis: usize) -> Option<f64> {
     (n >= Plane::FEWEST && determinant > 0.0).then(|| slopes[axis] / determinant)
 }
 
-/// Marks the changes between depths and those behind them that `is_change` tells of, and where there is a depth behind a
-/// missing one; from the pixels of number `first` on.
+/// Marks the changes between depths and those behind them, and where there is a depth behind a missing one; from the pixels
+/// of number `first` on.
 #[inline(always)]
 pub(crate) fn between(
     [before, behind]: [&[f32]; 2],
     [changes, behind_gaps]: [&mut [u64]; 2],
+    options: &Options,
     first: usize,
-    is_change: impl Fn(f32, f32, usize) -> bool,
 ) {
     for (x, (before, depth)) in before.iter().zip(behind).enumerate().skip(first) {
-        mark(changes, x, is_change(*before, depth - before, 1).into());
+        mark(changes, x, is_depth_change(*before, depth - before, 1, options).into());
         mark(behind_gaps, x, (before.is_nan() && !depth.is_nan()).into());
     }
 }

@@ -25,7 +25,7 @@ mod surroundings;
 pub(crate) use blocks::{BLOCK, Blocks, MIDDLE, middle};
 pub(crate) use choices::{
     ALIKE, CREASE_COST, CREASE_NOISE, EvenWindows, MISFIT, NEAR_NOISE, NEXT, NO_WINDOW, REACH,
-    places_at,
+    inverse_depth_along, places_at,
 };
 pub(crate) use cloud::{Cleaned, Cloud};
 pub(crate) use depth_change::{DepthChanges, between};
@@ -124,12 +124,10 @@ pub(crate) fn find_depth_changes(
     options: &Options,
     workers: &Workers,
 ) -> Result<(), Error> {
-    let is_change =
-        |depth: f32, difference: f32, gap: usize| is_depth_change(depth, difference, gap, options);
-    changes.find(cloud, workers, |depths, marks| between(depths, marks, 0, is_change), is_change)
+    changes.find(cloud, options, workers, |depths, marks| between(depths, marks, options, 0))
 }
 
-/// Whether depths that differ by `difference` between pixels `gap` apart are a depth change apart.
+/// Whether depths that differ by `difference` between pixels `gap` apart are a depth change apart; no NaN is.
 pub(crate) fn is_depth_change(depth: f32, difference: f32, gap: usize, options: &Options) -> bool {
     match options.semantics {
         Semantics::Paper => smoothing_area::is_depth_change(depth, difference, gap, &options.paper),

@@ -40,6 +40,8 @@ impl Plane {
     pub(crate) const DEEP: f64 = 0.25;
     /// The mean of a window's middle is off its plane by chance: so many variances of it are not the surface's bend.
     pub(crate) const BEND_NOISE: f64 = 4.0;
+    /// The most that the smallest of three eigenvalues can be of their sum.
+    pub(crate) const MOST_CURVATURE: f64 = 1.0 / 3.0;
 
     /// None if there are too few finite points to tell how well the plane fits, or if they are on one line of the image.
     pub fn of(cloud: &Cloud, rect: &Rect) -> Option<Plane> {
@@ -84,12 +86,13 @@ impl Plane {
         })
     }
 
-    /// Its normal, not turned, and as curvature what the points vary across it, as a share of how they vary.
+    /// Its normal, not turned, and as curvature what the points vary across it, as a share of how they vary; that is not below
+    /// the smallest eigenvalue's, and no more than the most that this can be.
     pub fn estimate(&self) -> Estimate {
         let share = 1.0 / dot(self.q, self.q).sqrt();
         let normal = self.q.map(|q| q * share);
         let across = dot(normal, self.covariance.times(normal));
-        let curvature = (across / self.covariance.trace()) as f32;
+        let curvature = (across / self.covariance.trace()).clamp(0.0, Self::MOST_CURVATURE) as f32;
         Estimate { normal: normal.map(|c| c as f32), curvature }
     }
 

@@ -5,21 +5,21 @@
 use std::iter::repeat_n;
 use std::mem::MaybeUninit;
 
-use super::windows::least_depth_change;
+use super::depth_changes::least_depth_change;
 use crate::Error;
 use crate::cache::Level;
 use crate::fast::arithmetic::Floats;
 use crate::fast::lanes::{LANES, Lanes};
 use crate::fast::tile::all;
-use crate::fast::windows::threshold;
 use crate::memory::{bytes, make_room, refill, resize};
-use crate::options::{Options, Semantics};
+use crate::options::Options;
 use crate::paper::{
     ALIKE, BLOCK, Blocks, CREASE_COST, CREASE_NOISE, Cloud, EvenWindow, EvenWindows, JITTER,
-    MIDDLE, MISFIT, NEAR_NOISE, NEXT, NO_WINDOW, REACH, inverse_depth, marks_from, places_at,
+    MIDDLE, MISFIT, NEAR_NOISE, NEXT, NO_WINDOW, REACH, inverse_depth, inverse_depth_along,
+    marks_from, places_at,
 };
 use crate::simd::{Along, Groups, Simd, load_by_fours};
-use crate::vector::dot;
+use crate::vector::difference;
 
 /// Finds the choices of the pixels of some rows of blocks; there is room.
 ///
@@ -151,7 +151,8 @@ struct Windows<S: Simd> {
     /// Where their middles are, from the blocks' middle pixels.
     middle: [Floats<S>; 2],
     radius: Floats<S>,
-    planes: Planes<S>,
+    /// The planes q P = 1.
+    q: [Floats<S>; 3],
     /// The rays of their mean points.
     ray: [Floats<S>; 3],
     per_misfit: Floats<S>,
@@ -163,25 +164,6 @@ struct Windows<S: Simd> {
 }
 
 const WINDOW_FIELDS: usize = 13;
-
-/// Planes q P = 1.
-#[derive(Clone, Copy)]
-struct Planes<S: Simd>([Floats<S>; 3]);
-
-impl<S: Simd> Planes<S> {
-    /// The inverse depths along rays.
-    #[inline(always)]
-    fn at(&self, ray: [Floats<S>; 3]) -> Floats<S> {
-        dot(self.0, ray)
-    }
-
-    /// How far the inverse depths are above the others', as planes.
-    #[inline(always)]
-    fn minus(&self, other: &Self) -> Self {
-        let Planes([x, y, z]) = other;
-        Planes([self.0[0] - *x, self.0[1] - *y, self.0[2] - *z])
-    }
-}
 
 /// A pixel of each block of a group.
 #[derive(Clone, Copy)]
@@ -215,19 +197,32 @@ impl<S: Simd> Windows<S> {
         // SAFETY: as the caller's.
         let [zero, per_misfit, even] =
             unsafe { [0.0, 1.0, f32::INFINITY].map(|value| Floats::splat(value)) };
-        let (middle, planes, ray) = ([zero; 2], Planes([zero; 3]), [zero; 3]);
+        let (middle, q, ray) = ([zero; 2], [zero; 3], [zero; 3]);
         let [radius, bend2, jitter] = [zero; 3];
-        Windows { middle, radius, planes, ray, per_misfit, bend2, even, jitter }
+        Windows { middle, radius, q, ray, per_misfit, bend2, even, jitter }
+    }
+
+    /// All fields, side by side.
+    #[inline(always)]
+    fn fields(&self) -> [Floats<S>; WINDOW_FIELDS] {
+        let &Windows { middle: [dx, dy], radius, q, ray, per_misfit, bend2, even, jitter } = self;
+        let ([a, b, c], [x, y, z]) = (q, ray);
+        [dx, dy, radius, a, b, c, x, y, z, per_misfit, bend2, even, jitter]
+    }
+
+    /// Those of which these are the fields.
+    #[inline(always)]
+    fn of(fields: [Floats<S>; WINDOW_FIELDS]) -> Self {
+        let [dx, dy, radius, a, b, c, x, y, z, per_misfit, bend2, even, jitter] = fields;
+        let (middle, q, ray) = ([dx, dy], [a, b, c], [x, y, z]);
+        Windows { middle, radius, q, ray, per_misfit, bend2, even, jitter }
     }
 
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn store(&self, to: &mut [Lanes; WINDOW_FIELDS]) {
-        let Windows { middle: [dx, dy], radius, planes, ray, per_misfit, bend2, even, jitter } =
-            *self;
-        let (Planes([a, b, c]), [x, y, z]) = (planes, ray);
-        let fields = [dx, dy, radius, a, b, c, x, y, z, per_misfit, bend2, even, jitter];
+        let fields = self.fields();
         for i in 0..WINDOW_FIELDS {
             // SAFETY: as the caller's; the array holds so many lanes.
             unsafe { S::store(to[i].0.as_mut_ptr(), fields[i].0) };
@@ -246,26 +241,17 @@ impl<S: Simd> Windows<S> {
             // SAFETY: as the caller's.
             fields[i].0 = unsafe { from[i].load::<S>() };
         }
-        let [dx, dy, radius, a, b, c, x, y, z, per_misfit, bend2, even, jitter] = fields;
-        let (planes, ray) = (Planes([a, b, c]), [x, y, z]);
-        Windows { middle: [dx, dy], radius, planes, ray, per_misfit, bend2, even, jitter }
+        Windows::of(fields)
     }
 
     /// Takes the others of a mask.
     #[inline(always)]
     fn take(&mut self, mask: S::F, other: &Self) {
-        for axis in 0..2 {
-            self.middle[axis].take(mask, other.middle[axis]);
+        let (mut fields, others) = (self.fields(), other.fields());
+        for i in 0..WINDOW_FIELDS {
+            fields[i].take(mask, others[i]);
         }
-        for i in 0..3 {
-            self.planes.0[i].take(mask, other.planes.0[i]);
-            self.ray[i].take(mask, other.ray[i]);
-        }
-        self.radius.take(mask, other.radius);
-        self.per_misfit.take(mask, other.per_misfit);
-        self.bend2.take(mask, other.bend2);
-        self.even.take(mask, other.even);
-        self.jitter.take(mask, other.jitter);
+        *self = Windows::of(fields);
     }
 
     /// What the windows cost a pixel of each block; infinite where they end short of it and of its surface.
@@ -274,13 +260,12 @@ impl<S: Simd> Windows<S> {
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn cost(&self, pixels: &Pixels<S>) -> Floats<S> {
-        let &Windows { middle: [dx, dy], radius, planes, per_misfit, bend2, even, jitter, .. } =
-            self;
+        let &Windows { middle: [dx, dy], radius, q, per_misfit, bend2, even, jitter, .. } = self;
         let Near { inverse_depth, noise } = pixels.near;
         // SAFETY: as the caller's.
         unsafe {
             let (zero, one) = (Floats::splat(0.0), Floats::splat(1.0));
-            let plane = planes.at(pixels.ray);
+            let plane = inverse_depth_along(q, pixels.ray);
             let astray = inverse_depth - plane;
             let astray = (astray * astray - noise).max(zero);
             let [x, y] = pixels.at;
@@ -289,7 +274,7 @@ impl<S: Simd> Windows<S> {
             let even = even + bend2 * (dx * dx + dy * dy);
             let cost = (even + astray * per_misfit) * (one + short * short);
             let off = (pixels.inverse_depth - plane).abs();
-            let lies_in = S::lt(off.0, (pixels.tolerance + jitter).0);
+            let lies_in = S::le(off.0, (pixels.tolerance + jitter).0);
             let is_beyond = S::and_not(lies_in, S::lt(zero.0, short.0));
             Floats(S::select(is_beyond, S::splat(f32::INFINITY), cost.0))
         }
@@ -362,7 +347,7 @@ impl<'a, S: Along> Found<'a, S> {
             let [unevenness, noise, per_noise, bend2] =
                 load_by_fours::<S>(|lane| window(lane).add(8));
             let (radius, steepness) = (Floats(radius), Floats(steepness));
-            let planes = Planes([Floats(a), Floats(b), Floats(c)]);
+            let q = [Floats(a), Floats(b), Floats(c)];
             let ray = [Floats(x), Floats(y), Floats(z)];
             let (zero, one) = (S::splat(0.0), S::splat(1.0));
             let middle @ [dx, dy] = [columns.from_own, rows.from_own];
@@ -376,7 +361,7 @@ impl<'a, S: Along> Found<'a, S> {
             let side = radius + radius + Floats(one);
             let per_misfit = Floats::splat(MISFIT) / (side * side);
             let (bend2, even) = (Floats(bend2), Floats(zero));
-            Windows { middle, radius, planes, ray, per_misfit, bend2, even, jitter }
+            Windows { middle, radius, q, ray, per_misfit, bend2, even, jitter }
                 .store(&mut to.windows);
             S::store(to.may_take.0.as_mut_ptr(), may_take);
             S::store(to.unevenness.0.as_mut_ptr(), unevenness);
@@ -461,7 +446,8 @@ impl<'a, S: Along> Found<'a, S> {
                 let cost = Floats(candidates.cost.load::<S>());
                 let is_better = S::lt(cost.0, least.0);
                 let crease = Crease::between(&these, &first, noise);
-                let better = S::and(is_better, crease.is_first_side(pixels.ray));
+                let [on_first_side, _] = crease.sides(pixels.ray);
+                let better = S::and(is_better, on_first_side);
                 // Mostly none is.
                 if S::bits(better) != 0 {
                     least.0 = S::select(better, (alike * cost).0, least.0);
@@ -592,14 +578,9 @@ impl Group<'_> {
                 let second_cost = second_windows.cost(own);
                 let (alike, times) = (Floats::splat(ALIKE), Floats::splat(ALIKE * CREASE_COST));
                 let is_better = S::lt(second_cost.0, (alike * first_cost).0);
-                let to_first = S::and(
-                    crease.is_first_side(own.ray),
-                    S::lt(first_cost.0, (times * second_cost).0),
-                );
-                let to_second = S::and(
-                    crease.is_second_side(own.ray),
-                    S::lt(second_cost.0, (times * first_cost).0),
-                );
+                let [on_first, on_second] = crease.sides(own.ray);
+                let to_first = S::and(on_first, S::lt(first_cost.0, (times * second_cost).0));
+                let to_second = S::and(on_second, S::lt(second_cost.0, (times * first_cost).0));
                 let takes_second = S::or(S::and_not(to_first, is_better), to_second);
                 let takes_second = S::and_not(S::eq(own.number.0, first.number.0), takes_second);
                 let takes_second = S::or(takes_second, S::eq(own.number.0, second.number.0));
@@ -632,7 +613,8 @@ impl Group<'_> {
 
 /// Whether and where the planes of two windows of each block meet between the middles of both.
 struct Crease<S: Simd> {
-    gap: Planes<S>,
+    /// The difference of both planes' q.
+    gap: [Floats<S>; 3],
     /// How far the first plane is above the second one in the middle of the first window.
     here: Floats<S>,
     /// The mask of the blocks that have one.
@@ -644,8 +626,9 @@ impl<S: Simd> Crease<S> {
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn between(first: &Windows<S>, second: &Windows<S>, noise: Floats<S>) -> Self {
-        let gap = first.planes.minus(&second.planes);
-        let (here, there) = (gap.at(first.ray), gap.at(second.ray));
+        let gap = difference(first.q, second.q);
+        let here = inverse_depth_along(gap, first.ray);
+        let there = inverse_depth_along(gap, second.ray);
         // SAFETY: as the caller's.
         unsafe {
             let least_gap = Floats::<S>(S::min(here.abs().0, there.abs().0));
@@ -656,25 +639,18 @@ impl<S: Simd> Crease<S> {
         }
     }
 
-    /// The mask of the blocks that have a crease and a ray on the first window's side of it: there the same plane is in
-    /// front as in the middle of that window.
+    /// The masks of the blocks that have a crease and a ray on the first window's side of it, where the same plane is in
+    /// front as in the middle of that window, and on the second one's.
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn is_first_side(&self, ray: [Floats<S>; 3]) -> S::F {
+    unsafe fn sides(&self, ray: [Floats<S>; 3]) -> [S::F; 2] {
         // SAFETY: as the caller's.
-        unsafe { S::and(self.there, S::lt(S::splat(0.0), (self.here * self.gap.at(ray)).0)) }
-    }
-
-    /// As [`Crease::is_first_side`], of the second window.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    unsafe fn is_second_side(&self, ray: [Floats<S>; 3]) -> S::F {
-        // SAFETY: as the caller's.
-        unsafe { S::and(self.there, S::lt((self.here * self.gap.at(ray)).0, S::splat(0.0))) }
+        unsafe {
+            let (side, zero) = (self.here * inverse_depth_along(self.gap, ray), S::splat(0.0));
+            [S::and(self.there, S::lt(zero, side.0)), S::and(self.there, S::lt(side.0, zero))]
+        }
     }
 }
 
@@ -728,10 +704,7 @@ impl Axis {
 unsafe fn tolerance<S: Simd>(depth: S::F, options: &Options) -> Floats<S> {
     // SAFETY: as the caller's.
     unsafe {
-        let least = match options.semantics {
-            Semantics::Paper => least_depth_change::<S>(depth, &options.paper),
-            Semantics::Pcl => threshold::<S>(depth, S::splat(options.max_depth_change_factor)),
-        };
+        let least = least_depth_change::<S>(depth, options);
         Floats(least) / Floats(S::mul(depth, depth)) * Floats::splat(0.5)
     }
 }

@@ -1,12 +1,12 @@
-//! The depth changes of a row, fast: the plain form is in `paper::depth_change`.
+//! Depth changes as the semantics tell them, fast: the plain forms are in `paper` and `paper::depth_change`.
 
-use super::windows::is_change;
+use super::windows;
 use crate::fast::windows::threshold;
 use crate::options::{Options, Semantics};
-use crate::paper::{between as plain_between, is_depth_change, mark};
+use crate::paper::{between as plain_between, mark};
 use crate::simd::Simd;
 
-/// [`between`](plain_between), of all pixels, as the semantics tell changes.
+/// [`between`](plain_between), of all pixels.
 ///
 /// # Safety
 /// The processor has the instruction set of `S`.
@@ -22,19 +22,31 @@ pub(super) unsafe fn between<S: Simd>(
         // SAFETY: as the caller's; there are so many depths.
         unsafe {
             let [depth, next] = [before, behind].map(|row| S::load(row.as_ptr().add(x)));
+            let least = least_depth_change::<S>(depth, options);
+            let difference = S::abs(S::sub(next, depth));
             let change = match options.semantics {
-                Semantics::Paper => is_change::<S>(depth, next, S::splat(1.0), &options.paper),
-                Semantics::Pcl => {
-                    let least = threshold::<S>(depth, S::splat(options.max_depth_change_factor));
-                    S::lt(least, S::abs(S::sub(next, depth)))
-                }
+                Semantics::Paper => S::le(least, difference),
+                Semantics::Pcl => S::lt(least, difference),
             };
             let [there, there_next] = [depth, next].map(|depth| S::bits(S::eq(depth, depth)));
             mark(changes, x, S::bits(change).into());
             mark(behind_gaps, x, (there_next & !there).into());
         }
     }
-    plain_between([before, behind], [changes, behind_gaps], whole, |depth, difference, gap| {
-        is_depth_change(depth, difference, gap, options)
-    });
+    plain_between([before, behind], [changes, behind_gaps], options, whole);
+}
+
+/// `paper::least_depth_change`
+///
+/// # Safety
+/// The processor has the instruction set of `S`.
+#[inline(always)]
+pub(super) unsafe fn least_depth_change<S: Simd>(depth: S::F, options: &Options) -> S::F {
+    // SAFETY: as the caller's.
+    unsafe {
+        match options.semantics {
+            Semantics::Paper => windows::least_depth_change::<S>(depth, &options.paper),
+            Semantics::Pcl => threshold::<S>(depth, S::splat(options.max_depth_change_factor)),
+        }
+    }
 }

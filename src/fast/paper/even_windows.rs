@@ -133,7 +133,9 @@ impl<S: Groups> Fits<S> {
             }
             let points = self.points.narrow();
             let (told, left) = (points - Floats::splat(3.0), points - taken);
-            self.unevenness * (told / left * above_chance(left, of_image.area)).widen()
+            let deviation = (Floats::splat(2.0 * of_image.area) / left).sqrt();
+            let chance = Floats::splat(1.0) + Floats::splat(CHANCE) * deviation;
+            self.unevenness * (told / left * chance).widen()
         }
     }
 
@@ -210,10 +212,11 @@ impl<S: Groups> Fits<S> {
             let normal = self.q.map(|q| q * share);
             let [xx, .., yy, _, zz] = self.covariance;
             let curvature = dot(normal, times(self.covariance, normal)) / (xx + yy + zz);
-            let [x, y, z, curvature] =
-                [normal[0], normal[1], normal[2], curvature].map(|field| field.narrow().0);
+            let most = Floats::splat(Plane::MOST_CURVATURE as f32);
+            let curvature = Floats::splat(0.0).max(curvature.narrow()).min(most);
+            let [x, y, z] = normal.map(|field| field.narrow().0);
             let to = found.as_mut_ptr().cast();
-            S::store_points([x, y, z, curvature], 3, to, size_of::<[f32; 4]>());
+            S::store_points([x, y, z, curvature.0], 3, to, size_of::<[f32; 4]>());
             if jagged != 0 {
                 let mut matrices = [[0.0; GROUP]; 6];
                 for (to, from) in matrices.iter_mut().zip(self.covariance) {
@@ -612,20 +615,6 @@ impl EvenTile<'_> {
             let least = Doubles::splat(self.even.asked.noise.least.into());
             !steep.lt(fits.unevenness) & !steep.lt(least) & !fits.points.lt(fewest)
         }
-    }
-}
-
-/// How many times a sample's variance the noise's may be by chance, where so many points are left to tell it and `area` of them
-/// have the same noise.
-///
-/// # Safety
-/// The processor has the instruction set of `S`.
-#[inline(always)]
-unsafe fn above_chance<S: Groups>(left: Floats<S>, area: f32) -> Floats<S> {
-    // SAFETY: as the caller's.
-    unsafe {
-        let deviation = (Floats::splat(2.0 * area) / left).sqrt();
-        Floats::splat(1.0) + Floats::splat(CHANCE) * deviation
     }
 }
 

@@ -42,6 +42,8 @@ pub(crate) struct Rings<const N: usize> {
     /// Row by row four planes: the points' fields.
     points: Buffer<f32>,
     columns: Range<usize>,
+    /// Rows of the image.
+    pub height: usize,
     /// Elements from a row of sums to the next, and from a field of a row's points to the next.
     pub stride: usize,
     /// Rows in the ring of sums, and in that of points.
@@ -61,8 +63,6 @@ pub(crate) struct Rings<const N: usize> {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Aimed {
     pub y: usize,
-    /// Rows of the image.
-    pub height: usize,
     /// The last row down to this one that is the first in the rings.
     first: usize,
 }
@@ -125,7 +125,7 @@ impl<const N: usize> Rings<N> {
         ends: bool,
         layer: &Layer,
     ) {
-        (self.stride, self.columns) = (stride(columns.len()), columns);
+        (self.stride, self.columns, self.height) = (stride(columns.len()), columns, height);
         self.rows = rows_of_rings(reach, height);
         self.rows_of_points = if ends { self.rows } else { self.rows.min(reach + 3) };
         (self.layer, self.nearest_hidden, self.largest) = (*layer, f32::INFINITY, 0.0);
@@ -230,9 +230,9 @@ impl<const N: usize> Rings<N> {
         }
     }
 
-    /// Aims at the windows around the pixels of row `y` in an image of this height.
-    pub fn aim(&mut self, y: usize, height: usize) {
-        self.aimed = Aimed { y, height, first: y - y % self.rows };
+    /// Aims at the windows around the pixels of row `y`.
+    pub fn aim(&mut self, y: usize) {
+        self.aimed = Aimed { y, first: y - y % self.rows };
     }
 
     /// [`Rings::start_of`] without a division, for rows that windows around the row aimed at reach; the one above the first
@@ -298,17 +298,12 @@ impl<const N: usize> Rings<N> {
             }
             self.largest = Floats::<S>(largest).largest();
         }
-        self.end_row(y);
+        // No points are behind the last column.
+        let weights = self.plane(y, WEIGHT);
+        self.points[weights][MARGIN + self.columns.len()..].fill(0.0);
         if self.layer.hides_some() {
             self.hide(y, depths);
         }
-    }
-
-    /// Has no points behind the last column.
-    fn end_row(&mut self, y: usize) {
-        let weights = self.plane(y, WEIGHT);
-        let end = MARGIN + self.columns.len();
-        self.points[weights][end..].fill(0.0);
     }
 
     /// Hides the points of row `y` whose depths, by column, are not in the layer.

@@ -34,23 +34,18 @@ use tile::{Tile, Written};
 use windows::{Rows, Sweep, reach};
 
 use super::buffer::Buffer;
+use super::lock;
 use super::paths::{self, Task};
 use super::sink::Sink;
 use super::tiling::{Tiling, part, reached};
 use super::windows::Sides;
-use super::{Parts, lock};
 use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::isa::Isa;
 use crate::memory::{bytes, refill, resize};
-use crate::methods::Estimate;
 use crate::options::{DistanceMetric, Method, Options, PaperOptions};
-use crate::paper::{
-    Asked, BLOCK, Blocks, Cloud, DepthChanges, EvenWindow, EvenWindows, Marks, NO_WINDOW,
-    PaperMaps, SecondPass, WORD, Windows, is_depth_change, word_of,
-};
+use crate::paper::{BLOCK, Blocks, Cloud, Marks, NO_WINDOW, PaperMaps, SecondPass, WORD, word_of};
 use crate::simd::{GROUP, Groups};
-use crate::threads::Workers;
 
 /// Floats hold the indices of a tile's rings, of four of the largest radii and what those reach, and less than a hundred more.
 const _: () = {
@@ -259,63 +254,13 @@ pub(crate) fn read_cloud(
     Ok(())
 }
 
-/// The depth changes of a cloud, as [`find_depth_changes`](crate::paper::find_depth_changes).
-fn find_depth_changes(
-    job: &Job,
-    changes: &mut DepthChanges,
-    cloud: &Cloud,
-    workers: &Workers,
-) -> Result<(), Error> {
-    let &Job { isa, options, .. } = job;
-    let between = |depths: [&[f32]; 2], marks: [&mut [u64]; 2]| {
-        // SAFETY: the processor has the instruction set.
-        unsafe { paths::run(isa, ChangesTask { depths, options, marks }) }
-    };
-    let is_change =
-        |depth: f32, difference: f32, gap: usize| is_depth_change(depth, difference, gap, options);
-    changes.find(cloud, workers, between, is_change)
-}
-
 /// Pixels' own normals.
 struct Own<'a> {
     /// The pixels that are left out.
-    pub concerned: &'a Marks,
+    concerned: &'a Marks,
     /// As [`compute`] has them.
-    pub indices: Option<&'a [i32]>,
-    pub normals: &'a Normals<'a>,
-}
-
-/// The even windows of all blocks and their estimates, and in the paper's semantics, if they are asked for, pixels' `own`;
-/// the job's method is CM. The depths have been read, and the pixels' own windows are those that [`Job::radii`] has found.
-/// Afterwards there is room for [`choices`].
-fn even_windows(
-    job: &Job,
-    (cloud, asked): (&Cloud, &Asked),
-    found: &mut Windows,
-    own: Option<Own>,
-    scratch: &mut super::Scratch,
-) -> Result<(), Error> {
-    for scratch in &scratch.each[..scratch.workers.count()] {
-        lock(scratch).paper.choices.reserve(cloud.width, asked.limit)?;
-    }
-    let blocks = asked.blocks.count();
-    resize(&mut found.even, blocks, EvenWindow::default())?;
-    resize(&mut found.of_even, blocks, Estimate::NONE.into())?;
-    let largest = (0..blocks).map(|block| asked.largest(block)).max().unwrap_or(0) as usize;
-    let windows = Parts(found.even.as_mut_ptr());
-    let estimates = Parts(found.of_even.as_mut_ptr());
-    job.even_tiles(scratch, &Even { cloud, asked, windows, estimates }, own, largest)
-}
-
-/// The block whose even window each pixel takes, or [`NO_WINDOW`].
-fn choices(isa: Isa, even: &EvenWindows, choices: &mut [u32], scratch: &mut super::Scratch) {
-    let super::Scratch { workers, each, .. } = scratch;
-    let rows = choices.chunks_mut(BLOCK * even.cloud.width).enumerate();
-    workers.share(rows, |worker, rows| {
-        let scratch = &mut lock(&each[worker]).paper.choices;
-        // SAFETY: the processor has the instruction set.
-        unsafe { paths::run(isa, ChoicesTask { even, rows, scratch }) }
-    });
+    indices: Option<&'a [i32]>,
+    normals: &'a Normals<'a>,
 }
 
 /// Image rows that are swept together, with the rows around them whose depth changes reach them.
@@ -559,7 +504,9 @@ impl Job<'_> {
         }
     }
 
-    /// The even windows, and normals by CM, tile by tile; the even windows' radii are not above `largest`.
+    /// The even windows and their estimates, and if they are asked for pixels' `own` normals by CM, tile by tile; the even
+    /// windows' radii are not above `largest`. The depths have been read, and the pixels' own windows are those that
+    /// [`Job::radii`] has found.
     #[inline(never)]
     fn even_tiles(
         &self,
@@ -653,24 +600,6 @@ impl Task for DepthsTask<'_> {
     }
 }
 
-/// The depth changes of a row.
-struct ChangesTask<'a> {
-    depths: [&'a [f32]; 2],
-    options: &'a Options,
-    marks: [&'a mut [u64]; 2],
-}
-
-impl Task for ChangesTask<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<S: Groups>(self) {
-        let ChangesTask { depths, options, marks } = self;
-        // SAFETY: as the caller's.
-        unsafe { depth_changes::between::<S::Widest>(depths, options, marks) }
-    }
-}
-
 /// The windows of some rows; gives the largest radius.
 struct SweepTask<'a> {
     rows: Rows<'a>,
@@ -729,23 +658,6 @@ impl Task for EvenTask<'_, '_> {
     }
 }
 
-/// The choices of the pixels of some rows of blocks.
-struct ChoicesTask<'a, 'c> {
-    even: &'a EvenWindows<'a>,
-    rows: &'a mut dyn Iterator<Item = (usize, &'c mut [u32])>,
-    scratch: &'a mut choices::Scratch,
-}
-
-impl Task for ChoicesTask<'_, '_> {
-    type Output = ();
-
-    #[inline(always)]
-    unsafe fn run<S: Groups>(self) {
-        // SAFETY: as the caller's.
-        unsafe { choices::rows::<S>(self.even, self.rows, self.scratch) }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -797,34 +709,6 @@ mod tests {
                         assert_eq!(along, depths(&scratch), "{isa:?} {width} x {height}");
                         scratch.paper = Scratch::default();
                     }
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn depth_changes_are_those_of_the_plain_form() {
-        for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
-            for (width, height) in [(1, 1), (1, 5), (16, 3), (17, 4), (64, 9), (65, 9), (128, 20)] {
-                // Steps, and gaps of all lengths in rows and columns.
-                let value = |i: usize| match (i * 7919 + i / 31) % 23 {
-                    0..6 => f32::NAN,
-                    value => 1.0 + (value / 9) as f32 * 0.2 + (i % 7) as f32 * 0.001,
-                };
-                let z: Vec<_> = (0..width * height).map(value).collect();
-                let points = Points::planes([&z, &z, &z], width, height, 0).unwrap();
-                let mut options = Options::default();
-                for semantics in Semantics::ALL {
-                    options.semantics = semantics;
-                    let cloud = Cloud::new(&points, &options).unwrap();
-                    let job = Job { isa, points: &points, options: &options };
-                    let workers = Workers::default();
-                    let [mut found, mut expected] = [(); 2].map(|()| DepthChanges::default());
-                    find_depth_changes(&job, &mut found, &cloud, &workers).unwrap();
-                    crate::paper::find_depth_changes(&mut expected, &cloud, &options, &workers)
-                        .unwrap();
-                    let [found, expected] = [found, expected].map(|changes| format!("{changes:?}"));
-                    assert_eq!(found, expected, "{isa:?} {semantics:?} {width} x {height}");
                 }
             }
         }

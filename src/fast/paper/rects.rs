@@ -26,7 +26,7 @@ impl Rows {
     /// Those of a radius around the row aimed at.
     #[inline(always)]
     pub fn new<const N: usize>(rings: &Rings<N>, radius: usize, edge: usize) -> Self {
-        let Aimed { y, height, .. } = rings.aimed;
+        let &Rings { height, aimed: Aimed { y, .. }, .. } = rings;
         let (first, last) = (y.saturating_sub(radius), (y + radius).min(height - 1));
         Rows {
             radius,
@@ -107,7 +107,7 @@ impl<S: Groups> Rects<S> {
                     return Rects::Alike { rows: *rows, place: rings.place(x) };
                 }
             }
-            let Aimed { y, height, .. } = rings.aimed;
+            let &Rings { height, aimed: Aimed { y, .. }, .. } = rings;
             let (columns, rows) = (pixels.columns(), Floats::whole(y));
             let [left, right] = range(columns, radii, width);
             let [top, bottom] = range(rows, radii, height);

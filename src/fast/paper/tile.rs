@@ -129,7 +129,7 @@ impl Tile<'_> {
             }
             *next += 1;
         }
-        rings.aim(y, height);
+        rings.aim(y);
         M::error(rings.total(*next - 1), columns.len() * (bottom - top), rings.largest)
     }
 

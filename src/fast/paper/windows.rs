@@ -305,7 +305,7 @@ pub(super) unsafe fn least_depth_change<S: Simd>(depth: S::F, options: &PaperOpt
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-pub(super) unsafe fn is_change<S: Simd>(
+unsafe fn is_change<S: Simd>(
     depth: S::F,
     neighbour: S::F,
     gap: S::F,
