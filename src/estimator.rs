@@ -118,7 +118,7 @@ impl Estimator {
             return Err(Error::Size);
         }
         let pixels = points.width() * points.height();
-        if indices.iter().any(|&index| usize::try_from(index).map_or(true, |i| i >= pixels)) {
+        if indices.iter().any(|&index| !usize::try_from(index).is_ok_and(|i| i < pixels)) {
             return Err(Error::Index);
         }
         normals.check_disjoint(points)?;

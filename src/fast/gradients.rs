@@ -5,10 +5,12 @@
 //! differences fit, and the limit on the coordinates sees to that.
 
 use super::arithmetic::{Floats, Integers, between};
+use super::estimates::Found;
+use super::lanes::Bits;
 use super::lanes::LANES;
 use super::planes::Frame;
 use super::run::{Noted, RUN};
-use super::tile::{Bits, Found, Pair, Tile};
+use super::tile::{Pair, Tile};
 use crate::simd::{GROUP, Groups, Simd};
 use crate::vector::{cross, dot};
 

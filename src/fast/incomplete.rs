@@ -2,8 +2,9 @@
 //! go wrong there.
 
 use super::buffer::Buffer;
+use super::lanes::Bits;
 use super::planes::{Frame, window_reach};
-use super::tile::{Bits, Pair};
+use super::tile::Pair;
 use crate::Error;
 use crate::cloud::Points;
 

@@ -1,4 +1,4 @@
-//! Sixteen pixels side by side, and rows of them in *lane order*.
+//! Sixteen pixels side by side, masks of them, and rows in *lane order*.
 //!
 //! A row of `width` pixels is cut into 16 segments of equal length; element k of the row in lane order holds pixel
 //! k of every segment. So the serial chain along a row that a distance transform needs runs in 16 lanes at once,
@@ -177,4 +177,31 @@ impl LaneOrder {
 #[inline(always)]
 fn finite_or_nan(z: f32) -> f32 {
     if z.is_finite() { z } else { f32::NAN }
+}
+
+/// The mask of the first `count` lanes.
+#[inline(always)]
+pub(crate) fn all(count: usize) -> u32 {
+    (1 << count) - 1
+}
+
+/// The set bits of a mask, lowest first.
+pub(crate) struct Bits(pub u32);
+
+impl Bits {
+    /// The mask of those of which this is so.
+    pub fn which(self, is_so: impl Fn(usize) -> bool) -> u32 {
+        self.filter(|lane| is_so(*lane)).fold(0, |lanes, lane| lanes | 1 << lane)
+    }
+}
+
+impl Iterator for Bits {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        let first = self.0.trailing_zeros() as usize;
+        self.0 &= self.0.wrapping_sub(1);
+        (first < 32).then_some(first)
+    }
 }

@@ -2,7 +2,7 @@
 //!
 //! First the windows of a slice of the image's rows (`windows`), then tile by tile, and if need be layer by layer
 //! (`layers`), the points (`planes`, `incomplete`), the method's rings of sums (`strip_pairs`, `strips`, `moments`,
-//! `half_windows`) and, run by run (`run`), the normals (`tile`, `one_point`). Slices are made of whole strips; strips,
+//! `half_windows`) and, run by run (`run`), the normals (`matrices`, `gradients`; `tile`, `one_point`, `estimates`). Slices are made of whole strips; strips,
 //! tiles and layers are fixed by the frame and the options, so that results do not depend on the number of threads. Rings
 //! of integers go on from one strip to the next where a thread makes both: their sums are the same to the bit.
 
@@ -10,11 +10,13 @@ mod arithmetic;
 mod buffer;
 mod by_side;
 mod depth;
+mod estimates;
 mod gradients;
 mod half_windows;
 mod incomplete;
 mod lanes;
 mod layers;
+mod matrices;
 mod moments;
 mod one_point;
 pub(crate) mod paper;

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::tile::Bits;
+use super::lanes::Bits;
 use crate::cloud::Points;
 use crate::rect::Rect;
 use crate::simd::Along;

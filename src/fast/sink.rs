@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
+use super::estimates::Estimates;
 use super::lanes::LANES;
-use super::tile::{Bits, Estimates, all};
+use super::lanes::{Bits, all};
 use crate::Error;
 use crate::cloud::Normals;
 use crate::memory::refill;

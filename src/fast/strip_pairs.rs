@@ -6,9 +6,10 @@
 //! whatever the windows of its neighbours.
 
 use super::buffer::Buffer;
+use super::estimates::Found;
 use super::gradients::{Both, Gradients, LeftCorners, PIXEL, Scale, VERTICAL, place, sum_between};
 use super::planes::{Frame, MARGIN, Planes};
-use super::tile::{Found, Pair, Sums, Tile};
+use super::tile::{Pair, Sums, Tile};
 use crate::Error;
 use crate::memory::{bytes, make_room};
 use crate::methods::{Estimate, average_3d_gradient, start};

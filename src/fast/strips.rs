@@ -5,11 +5,12 @@
 //! counted from where both have the same corners if the window's side is even.
 
 use super::buffer::Buffer;
+use super::estimates::Found;
 use super::gradients::{
     Both, Gradients, HORIZONTAL, LeftCorners, PIXEL, Scale, VERTICAL, place, sum_between,
 };
 use super::planes::{Frame, MARGIN, Planes};
-use super::tile::{Found, Pair, Sums, Tile};
+use super::tile::{Pair, Sums, Tile};
 use crate::Error;
 use crate::memory::{bytes, make_room};
 use crate::methods::start;

@@ -280,14 +280,14 @@ impl<'a> WindowRows<'a> {
     /// The image's row `y`.
     #[inline(always)]
     fn row(&mut self, y: usize) -> &mut [Lanes] {
-        let length = self.order.segment + 2;
+        let length = row_length(self.order.width);
         &mut self.rows[(y - self.first) * length..][..length]
     }
 
     /// Rows `y` and `y + 1`.
     #[inline(always)]
     fn two_rows(&mut self, y: usize) -> (&mut [Lanes], &mut [Lanes]) {
-        let length = self.order.segment + 2;
+        let length = row_length(self.order.width);
         self.rows[(y - self.first) * length..][..2 * length].split_at_mut(length)
     }
 

@@ -3,9 +3,10 @@
 
 use crate::cloud::{Normals, Points};
 use crate::fast::arithmetic::Floats;
+use crate::fast::estimates::turned;
 use crate::fast::lanes::LANES;
+use crate::fast::lanes::{Bits, all};
 use crate::fast::paths::Task;
-use crate::fast::tile::{Bits, all, turned};
 use crate::options::Options;
 use crate::paper::{Cloud, NO_WINDOW, SecondPass};
 use crate::simd::{Along, Groups, load_by_fours};

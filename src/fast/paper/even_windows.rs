@@ -9,9 +9,9 @@ use super::tile::{Run, Tile};
 use crate::eigen::Symmetric3;
 use crate::fast::Parts;
 use crate::fast::arithmetic::{Doubles, Floats};
-use crate::fast::moments::adjugate;
+use crate::fast::lanes::{Bits, all};
+use crate::fast::matrices::adjugate;
 use crate::fast::sink::Sink;
-use crate::fast::tile::{Bits, all};
 use crate::paper::{
     Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_LINES, JAGGED_POINTS, JAGGED_RADIUS,
     MIDDLE, Noise, Plane, RELIEF, RELIEF_RADIUS, ROUNDING, TAKEN, estimate_in_space, estimate_of,

@@ -4,9 +4,10 @@
 use super::integrals::{Around, Channels, Rings, WEIGHT};
 use super::rects::Rects;
 use crate::fast::arithmetic::{Doubles, Floats};
-use crate::fast::moments::{Matrices, WindowMoments};
+use crate::fast::estimates::Found;
+use crate::fast::lanes::Bits;
+use crate::fast::matrices::{Matrices, WindowMoments};
 use crate::fast::run::{Noted, OfRun};
-use crate::fast::tile::{Bits, Found};
 use crate::paper::ROUNDING;
 use crate::simd::{GROUP, Groups, Simd};
 use crate::vector::{cross, dot};

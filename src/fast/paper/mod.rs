@@ -2,8 +2,10 @@
 //! then tile by tile, and if need be layer by layer (`layers`), integral images of the method's channels (`integrals`,
 //! `methods`), which points are there (`presence`), the windows' sums (`rects`) and the normals (`tile`). For the second
 //! pass (`engine`), its depth changes (`depth_changes`), even windows (`even_windows`), which of them each pixel takes
-//! (`choices`), and their normals written to the pixels (`chosen`).
+//! (`choices`, of `candidates` for `block_pixels`), and their normals written to the pixels (`chosen`).
 
+mod block_pixels;
+mod candidates;
 mod choices;
 mod chosen;
 mod depth_changes;

@@ -11,9 +11,10 @@ use super::depths::row_length;
 use crate::Error;
 use crate::fast::arithmetic::Floats;
 use crate::fast::buffer::Buffer;
+use crate::fast::lanes::Bits;
 use crate::fast::lanes::{LANES, Lanes};
-use crate::fast::tile::Bits;
 use crate::options::PaperOptions;
+use crate::paper::smoothing_area;
 use crate::simd::Simd;
 
 /// More than any distance that matters; its square still fits a float exactly enough to stay the larger.
@@ -274,7 +275,7 @@ fn mark_gap(depths: &[f32], at: usize, options: &PaperOptions, right: &mut [f32]
     if let Some(from) = depths[..at].iter().rposition(|depth| !depth.is_nan()) {
         let difference = depths[at] - depths[from];
         let gap = at - from;
-        if crate::paper::smoothing_area::is_depth_change(depths[from], difference, gap, options) {
+        if smoothing_area::is_depth_change(depths[from], difference, gap, options) {
             right[at - 1] = f32::from_bits(!0);
         }
     }
