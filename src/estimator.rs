@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::cloud::{Normals, Points};
-use crate::fast::paper::{FastEngine, Job};
-use crate::fast::{self, SIZES, Scratch};
+use crate::fast::paper::FastEngine;
+use crate::fast::{self, Job, SIZES, Scratch};
 use crate::isa::Isa;
 use crate::methods::Estimate;
 use crate::options::{Method, Options, Semantics};
@@ -135,12 +135,12 @@ impl Estimator {
         let points = &points.beside(normals);
         if !self.is_plain(points) {
             let Estimator { ref options, isa, ref mut scratch, .. } = *self;
+            let job = Job { isa, points, options };
             if options.semantics == Semantics::Paper && !options.has_second_pass() {
-                let job = Job { isa, points, options };
                 return fast::paper::compute(&job, indices, normals, scratch);
             }
             if !options.is_beyond_pcl() {
-                return fast::compute(isa, points, options, indices, normals, scratch);
+                return fast::compute(&job, indices, normals, scratch);
             }
             return self.compute_beyond_pcl(points, indices, normals);
         }
@@ -285,18 +285,18 @@ impl Estimator {
         indices: Option<&[i32]>,
         normals: &Normals,
     ) -> Result<(), Error> {
-        let Estimator { options, isa, scratch, cloud, second_pass } = self;
-        let isa = *isa;
+        let Estimator { ref options, isa, ref mut scratch, ref mut cloud, ref mut second_pass } =
+            *self;
         let job = Job { isa, points, options };
         scratch.prepare(options.threads)?;
         fast::paper::read_cloud(&job, cloud, scratch)?;
         // To all windows, a point that misses a coordinate is missing whole.
         let points = &cloud.view().beside(normals);
+        let job = Job { points, ..job };
         // But for zeros, which are left out now, this is as PCL.
         if !options.has_second_pass() {
-            return fast::compute(isa, points, options, indices, normals, scratch);
+            return fast::compute(&job, indices, normals, scratch);
         }
-        let job = Job { points, ..job };
         // CM's sums are those of even windows too.
         let is_along = options.is_cm_of_paper();
         let own = is_along.then_some((indices, normals));
@@ -304,9 +304,7 @@ impl Estimator {
         if !is_along {
             fast::paper::find_left(&job, second_pass.choices(), scratch)?;
             match options.semantics {
-                Semantics::Pcl => {
-                    fast::compute_left(isa, points, options, indices, normals, scratch)
-                }
+                Semantics::Pcl => fast::compute_left(&job, indices, normals, scratch),
                 Semantics::Paper => fast::paper::compute_left(&job, indices, normals, scratch),
             }?;
         }

@@ -144,14 +144,14 @@ impl TileScratch {
     /// Makes room for tiles of a job with so many columns and windows of up to `side`; of depths, in f64 or integers.
     fn reserve(
         &mut self,
-        job: &Job,
+        job: &PclJob,
         is_integer: bool,
         columns: usize,
         side: usize,
     ) -> Result<(), Error> {
         let frame = &Frame::largest(columns, side, (job.image.width, job.image.height));
         self.planes.reserve(frame)?;
-        match job.options.method {
+        match job.job.options.method {
             Method::CovarianceMatrix => self.moments.reserve(frame, side),
             Method::Average3DGradient => self.strip_pairs.reserve(frame, side),
             Method::AverageDepthChange if is_integer => {
@@ -177,10 +177,16 @@ fn lock(scratch: &Mutex<WorkerScratch>) -> MutexGuard<'_, WorkerScratch> {
 }
 
 /// One computation.
-struct Job<'a> {
-    isa: Isa,
-    points: &'a Points<'a>,
-    options: &'a Options,
+#[derive(Clone, Copy)]
+pub(crate) struct Job<'a> {
+    pub isa: Isa,
+    pub points: &'a Points<'a>,
+    pub options: &'a Options,
+}
+
+/// One in PCL's semantics.
+struct PclJob<'a> {
+    job: Job<'a>,
     image: Image,
     /// How far points are apart, for [`scale_to_integers`].
     spacing: f32,
@@ -190,35 +196,31 @@ struct Job<'a> {
 
 /// The normals of the pixels that `indices` list, or of all.
 pub(crate) fn compute(
-    isa: Isa,
-    points: &Points,
-    options: &Options,
+    job: &Job,
     indices: Option<&[i32]>,
     normals: &Normals,
     scratch: &mut Scratch,
 ) -> Result<(), Error> {
     let output = Some((indices, normals));
-    compute_slices(isa, points, options, output, |_, _| (), scratch)
+    compute_slices(job, output, |_, _| (), scratch)
 }
 
 /// As [`compute`], of the pixels that the second pass leaves to their own windows, the sides of which [`sides`] has found; if
 /// these are not few, of all. The job's depths have been read.
 pub(crate) fn compute_left(
-    isa: Isa,
-    points: &Points,
-    options: &Options,
+    job: &Job,
     indices: Option<&[i32]>,
     normals: &Normals,
     scratch: &mut Scratch,
 ) -> Result<(), Error> {
-    let size @ (width, height) = (points.width(), points.height());
+    let size @ (width, height) = (job.points.width(), job.points.height());
     let Scratch { workers, each, listed, paper, .. } = scratch;
     let (left, sides) = (&paper.left, paper.sides(width));
     let row = |y: usize| sides.row(y);
     let Some(cells) = Tiling::cells(size, left, row, |side| side as usize / 2 + 1) else {
-        return compute(isa, points, options, indices, normals, scratch);
+        return compute(job, indices, normals, scratch);
     };
-    let job = Job::new(isa, points, options);
+    let job = PclJob::new(*job);
     let sink = Sink::new(normals, indices, width, listed)?;
     let done = workers.try_share(cells.tiles(), |worker, tiles| {
         let sums = &mut lock(&each[worker]).sums;
@@ -239,9 +241,9 @@ pub(crate) fn compute_left(
 }
 
 /// The sides of all pixels' windows, 0 for none, in place of the paper's radii.
-fn sides(isa: Isa, points: &Points, options: &Options, scratch: &mut Scratch) -> Result<(), Error> {
-    let width = points.width();
-    let (mut found, length) = scratch.paper.take_sizes(points)?;
+fn sides(job: &Job, scratch: &mut Scratch) -> Result<(), Error> {
+    let width = job.points.width();
+    let (mut found, length) = scratch.paper.take_sizes(job.points)?;
     let rows = Parts(found.as_mut_ptr());
     let read = |of_slice: Range<usize>, sides: Sides| {
         for y in of_slice {
@@ -250,26 +252,25 @@ fn sides(isa: Isa, points: &Points, options: &Options, scratch: &mut Scratch) ->
             to.copy_from_slice(&sides.row(y)[..width]);
         }
     };
-    compute_slices(isa, points, options, None, read, scratch)?;
+    compute_slices(job, None, read, scratch)?;
     scratch.paper.radii = found;
     Ok(())
 }
 
 /// As [`compute`], if there is an output; gives every slice's rows and the sides of their windows to `read`.
 fn compute_slices(
-    isa: Isa,
-    points: &Points,
-    options: &Options,
+    job: &Job,
     output: Option<(Option<&[i32]>, &Normals)>,
     read: impl Fn(Range<usize>, Sides) + Sync,
     scratch: &mut Scratch,
 ) -> Result<(), Error> {
+    let &Job { points, options, .. } = job;
     scratch.prepare(options.threads)?;
     let Scratch { workers, each, listed, last_reach, .. } = scratch;
     let (width, height) = (points.width(), points.height());
     let least_reach = reach(points, options, 0.0);
     let expected = least_reach.max(*last_reach);
-    let job = Job::new(isa, points, options);
+    let job = PclJob::new(*job);
     let strips = job.strips;
     let per_slice = (SLICE_REACHES * expected).div_ceil(height / strips).min(strips);
     // Nothing is written if there is no memory for what is known already.
@@ -369,13 +370,14 @@ struct Strip {
     depths: [f32; 2],
 }
 
-impl<'a> Job<'a> {
-    fn new(isa: Isa, points: &'a Points, options: &'a Options) -> Self {
+impl<'a> PclJob<'a> {
+    fn new(job: Job<'a>) -> Self {
+        let Job { points, options, .. } = job;
         let (width, height) = (points.width(), points.height());
         let image = Image { width, height, border_policy: options.border_policy };
         let is_depth = options.method == Method::AverageDepthChange;
         let spacing = if is_depth { spacing(points) } else { 0.0 };
-        Job { isa, points, options, image, spacing, strips: strips(width, height) }
+        PclJob { job, image, spacing, strips: strips(width, height) }
     }
 
     /// Where a strip starts: strips are of like heights.
@@ -389,7 +391,7 @@ impl<'a> Job<'a> {
     #[inline(never)]
     fn sweep(&self, windows: &mut Windows, slice: Range<usize>) -> Result<(), Error> {
         // SAFETY: the processor has the instruction set of the job.
-        unsafe { paths::run(self.isa, SweepTask { job: self, windows, slice }) }
+        unsafe { paths::run(self.job.isa, SweepTask { job: self.job, windows, slice }) }
     }
 
     /// Steps 4 and 5: the tiles of a strip, the windows of which were found. Returns how far they reach.
@@ -401,7 +403,8 @@ impl<'a> Job<'a> {
         rows: Range<usize>,
         sink: &Sink,
     ) -> Result<usize, Error> {
-        let &Job { points, options, image: Image { width, height, .. }, .. } = self;
+        let &PclJob { job: Job { points, options, .. }, ref image, .. } = self;
+        let &Image { width, height, .. } = image;
         let own = windows.swept(rows.clone());
         let reach = reach(points, options, own.deepest());
         let around = windows.swept(reached(&rows, reach, height));
@@ -419,7 +422,7 @@ impl<'a> Job<'a> {
         scratch: &mut TileScratch,
         sink: &Sink,
     ) -> Result<(), Error> {
-        let &Job { points, options, .. } = self;
+        let Job { points, options, .. } = self.job;
         let Strip { columns: Range { start, end }, rows, side, reach, depths } = strip;
         let is_depth = options.method == Method::AverageDepthChange;
         let scale = || scale_to_integers(self.spacing, options, depths[1], side);
@@ -466,13 +469,13 @@ impl<'a> Job<'a> {
         sink: &Sink,
     ) {
         // SAFETY: the processor has the instruction set of the job, and tiles do not share pixels.
-        unsafe { paths::run(self.isa, TileTask { tile, frame, planes, sums, sink }) };
+        unsafe { paths::run(self.job.isa, TileTask { tile, frame, planes, sums, sink }) };
     }
 
     /// How many times as deep as the nearest points others may be for the method's sums, of integers or not, to be fine
     /// enough for both: found by trying, as more layers take more time.
     fn span(&self, is_integer: bool) -> f32 {
-        match self.options.method {
+        match self.job.options.method {
             Method::AverageDepthChange if is_integer => f32::INFINITY,
             Method::AverageDepthChange => 4096.0,
             Method::CovarianceMatrix | Method::Average3DGradient | Method::Simple3DGradient => 24.0,
@@ -482,7 +485,7 @@ impl<'a> Job<'a> {
     /// Columns of a tile, if windows reach so far from their pixels.
     fn columns(&self, is_integer: bool, reach: usize) -> usize {
         let column = 3 * size_of::<f32>()
-            + match self.options.method {
+            + match self.job.options.method {
                 Method::CovarianceMatrix => Moments::COLUMN,
                 Method::Average3DGradient => StripPairs::COLUMN,
                 Method::AverageDepthChange if is_integer => HalfWindows::<i32>::COLUMN,
@@ -500,7 +503,7 @@ impl<'a> Job<'a> {
 
 /// The sweeps of one slice.
 struct SweepTask<'a> {
-    job: &'a Job<'a>,
+    job: Job<'a>,
     windows: &'a mut Windows,
     slice: Range<usize>,
 }

@@ -1,11 +1,11 @@
 //! What the second pass builds on, fast.
 
 use super::even_windows::Even;
-use super::{Job, Own, choices, depth_changes};
+use super::{Own, choices, depth_changes};
 use crate::Error;
 use crate::cloud::Normals;
 use crate::fast::paths::{self, Task};
-use crate::fast::{Parts, Scratch, lock, sides};
+use crate::fast::{Job, Parts, Scratch, lock, sides};
 use crate::memory::resize;
 use crate::methods::Estimate;
 use crate::options::{Method, Options, Semantics};
@@ -32,7 +32,7 @@ impl Engine for FastEngine<'_> {
     fn find_sizes(&mut self) -> Result<(), Error> {
         let FastEngine { job, scratch, .. } = self;
         match job.options.semantics {
-            Semantics::Pcl => sides(job.isa, job.points, job.options, scratch),
+            Semantics::Pcl => sides(job, scratch),
             Semantics::Paper => job.radii(scratch),
         }
     }

@@ -36,14 +36,13 @@ use tile::{Tile, Written};
 use windows::{Rows, Sweep, reach};
 
 use super::buffer::Buffer;
-use super::lock;
 use super::paths::{self, Task};
 use super::sink::Sink;
 use super::tiling::{Tiling, part, reached};
 use super::windows::Sides;
+use super::{Job, lock};
 use crate::Error;
 use crate::cloud::{Normals, Points};
-use crate::isa::Isa;
 use crate::memory::{bytes, refill, resize};
 use crate::options::{DistanceMetric, Method, Options, PaperOptions};
 use crate::paper::{BLOCK, Blocks, Cloud, Marks, NO_WINDOW, PaperMaps, SecondPass, WORD, word_of};
@@ -328,14 +327,6 @@ fn room(
     };
     let most = reach.max(ROOMY_RADIUS.min(limit as usize));
     (0..=most).map(of_reach).max().expect("a radius")
-}
-
-/// One computation.
-#[derive(Clone, Copy)]
-pub(crate) struct Job<'a> {
-    pub isa: Isa,
-    pub points: &'a Points<'a>,
-    pub options: &'a Options,
 }
 
 // The stages are not inlined: profiles and the test of instruction counts tell them by name.
@@ -663,6 +654,7 @@ impl Task for EvenTask<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::isa::Isa;
     use crate::options::Semantics;
 
     #[test]
