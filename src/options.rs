@@ -184,7 +184,7 @@ pub struct Options {
     pub border_policy: BorderPolicy,
     /// Side of the largest window in pixels; finite, above 0, default 10. The side of a pixel's window is
     /// `min(distance to the nearest depth change, normal_smoothing_size)` rounded down, and pixels where that
-    /// minimum is not above 2 get no normal.
+    /// minimum is not above 2 get no normal but that of `one_sided_windows`.
     pub normal_smoothing_size: f32,
     /// Adds a tenth of the pixel's z (signed, in the cloud's unit) to the smoothing size; default off.
     pub depth_dependent_smoothing: bool,
