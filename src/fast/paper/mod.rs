@@ -1,13 +1,15 @@
-//! The paper's windows and methods, fast: depths (`depths`), the radii of the windows of the whole image (`windows`),
-//! then tile by tile, and if need be layer by layer (`layers`), integral images of the method's channels (`integrals`,
-//! `methods`), which points are there (`presence`), the windows' sums (`rects`) and the normals (`tile`). For the second
-//! pass (`engine`), its depth changes (`depth_changes`), even windows (`even_windows`), which of them each pixel takes
-//! (`choices`, of `candidates` for `block_pixels`), and their normals written to the pixels (`chosen`).
+//! The paper's windows and methods, fast: depths (`depths`), the radii of the windows of the whole image (`windows`, in
+//! `chunks` of rows), then tile by tile, and if need be layer by layer (`layers`), integral images of the method's
+//! channels (`integrals`, `methods`), which points are there (`presence`), the windows' sums (`rects`) and the normals
+//! (`tile`). For the second pass (`engine`), its depth changes (`depth_changes`), even windows (`even_windows`), which
+//! of them each pixel takes (`choices`, of `candidates` for `block_pixels`), and their normals written to the pixels
+//! (`chosen`).
 
 mod block_pixels;
 mod candidates;
 mod choices;
 mod chosen;
+mod chunks;
 mod depth_changes;
 mod depths;
 mod engine;
@@ -27,6 +29,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 pub(crate) use engine::FastEngine;
 
 use chosen::ChosenRow;
+use chunks::{Chunk, place, share_out};
 use depths::{OneRow, PointRows, room_for_columns, row_length};
 use even_windows::{Even, EvenTile};
 use integrals::{Rings, elements_of_rings, presence_of_rings, rows_of_rings};
@@ -43,7 +46,7 @@ use super::windows::Sides;
 use super::{Job, lock};
 use crate::Error;
 use crate::cloud::{Normals, Points};
-use crate::memory::{bytes, refill, resize};
+use crate::memory::{bytes, resize};
 use crate::options::{DistanceMetric, Method, Options, PaperOptions};
 use crate::paper::{BLOCK, Blocks, Cloud, Marks, NO_WINDOW, PaperMaps, SecondPass, WORD, word_of};
 use crate::simd::{GROUP, Groups};
@@ -264,43 +267,6 @@ struct Own<'a> {
     normals: &'a Normals<'a>,
 }
 
-/// Image rows that are swept together, with the rows around them whose depth changes reach them.
-#[derive(Clone, Debug)]
-struct Chunk {
-    own: Range<usize>,
-    swept: Range<usize>,
-    /// Where the swept rows start among the rows of the map.
-    start: usize,
-}
-
-impl Chunk {
-    /// Which of the map's rows an own row of the chunk is.
-    fn place(&self, y: usize) -> usize {
-        self.start + y - self.swept.start
-    }
-}
-
-/// The rows shared out to `count` sweeps. A depth change more than `reach` away decides no window, so each sweep can
-/// start and end that far around its own rows.
-fn share_out(
-    height: usize,
-    count: usize,
-    reach: usize,
-    chunks: &mut Vec<Chunk>,
-) -> Result<(), Error> {
-    let per_chunk = height.div_ceil(count);
-    let per_chunk = if per_chunk < 2 * reach { height } else { per_chunk };
-    let mut start = 0;
-    let first_rows = (0..height).step_by(per_chunk);
-    let chunk = |first: usize| {
-        let own = first..(first + per_chunk).min(height);
-        let swept = reached(&own, reach, height);
-        start += swept.len();
-        Chunk { own, start: start - swept.len(), swept }
-    };
-    refill(chunks, first_rows.map(chunk))
-}
-
 /// Tiles for windows that reach so far from their pixels, in rings of so many bytes a column and row.
 fn tiling(width: usize, height: usize, reach: usize, column: usize) -> Tiling {
     let ring = rows_of_rings(reach, height);
@@ -359,41 +325,49 @@ impl Job<'_> {
         radii.grow(swept * length)?;
         let depths = &depths[..length * height];
         let radii = &mut radii[..swept * length];
+        if options.paper.distance_metric == DistanceMetric::Chamfer {
+            *of_all = self.plain_radii(chunks, radii)?;
+            return Ok(());
+        }
+        for scratch in &each[..count] {
+            lock(scratch).paper.sweep.reserve(width, &options.paper)?;
+        }
         let largest = AtomicU32::new(0);
-        if options.paper.distance_metric == DistanceMetric::Euclidean {
-            for scratch in &each[..count] {
-                lock(scratch).paper.sweep.reserve(width, &options.paper)?;
+        let mut rest = radii;
+        let parts = chunks.iter().map(|chunk| {
+            let map = rest.split_off_mut(..chunk.swept.len() * length);
+            (chunk, map.expect("a row for each that is swept"))
+        });
+        workers.share(parts, |worker, parts| {
+            let sweep = &mut lock(&each[worker]).paper.sweep;
+            for (Chunk { swept, own, .. }, map) in parts {
+                let (first, count, own) = (swept.start, swept.len(), own.clone());
+                let rows = Rows { width, first, count, own, depths, map };
+                let task = SweepTask { rows, options, sweep };
+                // SAFETY: the processor has the instruction set.
+                let radius = unsafe { paths::run(self.isa, task) };
+                largest.fetch_max(radius as u32, Ordering::Relaxed);
             }
-            let mut rest = radii;
-            let parts = chunks.iter().map(|chunk| {
-                let map = rest.split_off_mut(..chunk.swept.len() * length);
-                (chunk, map.expect("a row for each that is swept"))
-            });
-            workers.share(parts, |worker, parts| {
-                let sweep = &mut lock(&each[worker]).paper.sweep;
-                for (Chunk { swept, own, .. }, map) in parts {
-                    let (first, count, own) = (swept.start, swept.len(), own.clone());
-                    let rows = Rows { width, first, count, own, depths, map };
-                    let task = SweepTask { rows, options, sweep };
-                    // SAFETY: the processor has the instruction set.
-                    let radius = unsafe { paths::run(self.isa, task) };
-                    largest.fetch_max(radius as u32, Ordering::Relaxed);
-                }
-            });
-        } else {
-            let maps = PaperMaps::new(points, options)?;
-            for Chunk { swept, start, .. } in chunks.iter() {
-                for (y, row) in swept.clone().zip(radii[start * length..].chunks_mut(length)) {
-                    let exact = &maps.smoothing_radii[y * width..][..width];
-                    for (radius, exact) in row.iter_mut().zip(exact) {
-                        *radius = exact.trunc();
-                        largest.fetch_max(*radius as u32, Ordering::Relaxed);
-                    }
+        });
+        *of_all = largest.into_inner() as usize;
+        Ok(())
+    }
+
+    /// The radii in the chunks' rows by the plain form; returns the largest.
+    fn plain_radii(&self, chunks: &[Chunk], radii: &mut [f32]) -> Result<usize, Error> {
+        let maps = PaperMaps::new(self.points, self.options)?;
+        let (width, length) = (self.points.width(), row_length(self.points.width()));
+        let mut largest = 0.0_f32;
+        for Chunk { swept, start, .. } in chunks {
+            for (y, row) in swept.clone().zip(radii[start * length..].chunks_mut(length)) {
+                let exact = &maps.smoothing_radii[y * width..][..width];
+                for (radius, exact) in row.iter_mut().zip(exact) {
+                    *radius = exact.trunc();
+                    largest = largest.max(*radius);
                 }
             }
         }
-        *of_all = largest.into_inner() as usize;
-        Ok(())
+        Ok(largest as usize)
     }
 
     /// The sizes of the windows of a row's pixels, as [`Engine::sizes`](crate::paper::Engine::sizes).
@@ -405,8 +379,7 @@ impl Job<'_> {
     fn row<'s>(&self, scratch: &'s Scratch, y: usize) -> (&'s [f32], &'s [f32]) {
         let length = row_length(self.points.width());
         let Scratch { depths, radii, chunks, .. } = scratch;
-        // All chunks but the last have as many own rows.
-        let place = chunks[y / chunks[0].own.len()].place(y);
+        let place = place(chunks, y);
         (&depths[y * length..][..length], &radii[place * length..][..length])
     }
 
