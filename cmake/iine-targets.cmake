@@ -8,8 +8,9 @@
 #
 # In: iine_LIBRARY_DIR, iine_INCLUDE_DIR, iine_VERSION, iine_ABI (as in the SONAME), iine_SCOPE (GLOBAL or empty).
 
-# What rustc says a static library of this crate needs (--print native-static-libs; a test compares).
-set(iine_STATIC_LIBRARIES gcc_s util rt pthread m dl c)
+# What rustc says a static library of this crate needs (--print native-static-libs; a test compares), but for gcc_s:
+# compilers add it themselves, or gcc_eh with -static.
+set(iine_STATIC_LIBRARIES util rt pthread m dl c)
 
 add_library(iine::shared SHARED IMPORTED ${iine_SCOPE})
 set_target_properties(iine::shared PROPERTIES
@@ -17,10 +18,12 @@ set_target_properties(iine::shared PROPERTIES
   IMPORTED_SONAME libiine.so.${iine_ABI}
   INTERFACE_INCLUDE_DIRECTORIES ${iine_INCLUDE_DIR})
 
+# A shared library with iine::static in it would else export all of iine and of Rust's library.
 add_library(iine::static STATIC IMPORTED ${iine_SCOPE})
 set_target_properties(iine::static PROPERTIES
   IMPORTED_LOCATION ${iine_LIBRARY_DIR}/libiine.a
   INTERFACE_INCLUDE_DIRECTORIES ${iine_INCLUDE_DIR}
+  INTERFACE_LINK_OPTIONS LINKER:--exclude-libs,libiine.a
   INTERFACE_LINK_LIBRARIES "${iine_STATIC_LIBRARIES}")
 
 set(iine_kind shared)

@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What a program that links `libiine.a` must link too; `cmake/iine-targets.cmake` has the same list.
-const STATIC_LIBRARIES: [&str; 7] =
-    ["-lgcc_s", "-lutil", "-lrt", "-lpthread", "-lm", "-ldl", "-lc"];
+const STATIC_LIBRARIES: [&str; 6] = ["-lutil", "-lrt", "-lpthread", "-lm", "-ldl", "-lc"];
 
 /// The libraries that cargo built for this very test.
 fn library(name: &str) -> PathBuf {
