@@ -6,6 +6,7 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <string>
 #include <thread>
 #include <type_traits>
 #include <utility>
@@ -95,6 +96,18 @@ namespace
     EXPECT_EQ (iine_estimator_compute_window (estimator, &points, x, y, width, height, &normals), IINE_OK);
     iine_estimator_free (estimator);
     return normal;
+  }
+
+  /** \brief Whether a call prints this error of one of the class's members. */
+  template <typename Call> ::testing::AssertionResult
+  prints (const std::string &error, const Call &call)
+  {
+    ::testing::internal::CaptureStderr ();
+    call ();
+    const std::string printed = ::testing::internal::GetCapturedStderr ();
+    if (printed.find ("[iine::IntegralImageNormalEstimation::" + error + ".\n") != std::string::npos)
+      return ::testing::AssertionSuccess ();
+    return ::testing::AssertionFailure () << "printed: " << printed;
   }
 
   /** \brief How many threads the process has. */
@@ -478,6 +491,49 @@ TEST (Errors, MirroredSimpleGradientThrows)
   EXPECT_THROW (estimator.computePointNormalMirror (9, 9, 9 * 60 + 9, normal), pcl::PCLException);
   estimator.setBorderPolicy (Estimator::BORDER_POLICY_IGNORE);
   EXPECT_TRUE (areEqual (compute (estimator), computeFresh (scene (), Estimator::SIMPLE_3D_GRADIENT)));
+}
+
+TEST (Errors, SayWhatIsWrong)
+{
+  Estimator e;
+  pcl::Normal normal;
+  std::vector<float> map;
+  const float infinity = std::numeric_limits<float>::infinity ();
+  EXPECT_TRUE (prints ("setNormalSmoothingSize] -1 is refused: finite and above 0",
+                       [&] () { e.setNormalSmoothingSize (-1.0f); }));
+  EXPECT_TRUE (prints ("setPaperAlpha] inf is refused: finite and above 0", [&] () { e.setPaperAlpha (infinity); }));
+  EXPECT_TRUE (prints ("setPaperBeta] nan is refused: finite and above 0", [&] () { e.setPaperBeta (NaN); }));
+  EXPECT_TRUE (prints ("setPaperGamma] -0.5 is refused: finite and above 0", [&] () { e.setPaperGamma (-0.5f); }));
+  EXPECT_TRUE (prints ("setPaperRadii] 5, 4, 9 is refused: 1 <= smallest_radius <= least_depth_radius <= largest_radius "
+                       "<= 1000", [&] () { e.setPaperRadii (5, 4, 9); }));
+  EXPECT_TRUE (prints ("setNumberOfThreads] 4294967295 is refused: at most 1024",
+                       [&] () { e.setNumberOfThreads (std::numeric_limits<unsigned>::max ()); }));
+  EXPECT_EQ (e.getLastStatus (), IINE_OK) << "a setter changes it";
+
+  EXPECT_TRUE (prints ("initCompute] no input cloud was set", [&] () { compute (e); }));
+  EXPECT_TRUE (prints ("computePointNormal] no input cloud was set",
+                       [&] () { e.computePointNormal (9, 9, 9 * 60 + 9, normal); }));
+  EXPECT_TRUE (prints ("setInputCloud] the cloud is not organized (height = 1)",
+                       [&] () { e.setInputCloud (Cloud::Ptr (new Cloud (100, 1))); }));
+  EXPECT_TRUE (prints ("initCompute] the cloud is not organized (height = 1), or its size is not its width times its "
+                       "height, or it is empty or too large", [&] () { compute (e); }));
+  e.setInputCloud (scene ());
+  EXPECT_TRUE (prints ("getDepthRadiusMap] nothing has been computed from this cloud, or the last compute failed",
+                       [&] () { e.getDepthRadiusMap (map); }));
+  e.setRectSize (-5, 5);
+  EXPECT_TRUE (prints ("computePointNormal] -5 x 5 is refused: setRectSize's sizes are 0 or above",
+                       [&] () { e.computePointNormal (9, 9, 9 * 60 + 9, normal); }));
+  compute (e);
+  EXPECT_TRUE (prints ("getDepthRadiusMap] the last compute had SEMANTICS_PCL or SIMPLE_3D_GRADIENT, which have no "
+                       "depth radii", [&] () { e.getDepthRadiusMap (map); }));
+  EXPECT_TRUE (prints ("getEigenvalueMap] the last compute was not with COVARIANCE_MATRIX, which alone has eigenvalues",
+                       [&] () { e.getEigenvalueMap (map); }));
+  e.setSemantics (Estimator::SEMANTICS_PAPER);
+  e.setNormalEstimationMethod (Estimator::SIMPLE_3D_GRADIENT);
+  EXPECT_TRUE (prints ("compute] SIMPLE_3D_GRADIENT does not go with SEMANTICS_PAPER", [&] () { compute (e); }));
+  e.setSemantics (static_cast<Estimator::Semantics> (2));
+  EXPECT_TRUE (prints ("compute] the method, border policy, semantics, distance metric or depth is none of the "
+                       "enumerators", [&] () { compute (e); }));
 }
 
 TEST (Viewpoint, IsReadWhereTheCloudIsSetOrAskedFor)

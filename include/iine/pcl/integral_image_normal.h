@@ -9,8 +9,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <iostream>
 #include <limits>
 #include <memory>
+#include <string>
 #include <type_traits>
 #include <vector>
 
@@ -190,7 +192,7 @@ namespace iine
       setNormalSmoothingSize (float normal_smoothing_size)
       {
         const int status = iine_estimator_set_normal_smoothing_size (handle_.get (), normal_smoothing_size);
-        if (isTaken ("setNormalSmoothingSize", status))
+        if (isTaken ("setNormalSmoothingSize", status, normal_smoothing_size, "finite and above 0"))
           options_.normal_smoothing_size = normal_smoothing_size;
       }
 
@@ -225,8 +227,7 @@ namespace iine
           return;
         if (!cloud->isOrganized ())
         {
-          PCL_ERROR ("[iine::%s::setInputCloud] The cloud is not organized (height = 1).\n",
-                     feature_name_.c_str ());
+          report ("setInputCloud", "the cloud is not organized (height = 1)");
           return;
         }
         if (use_sensor_origin_)
@@ -295,7 +296,8 @@ namespace iine
       bool
       getDepthRadiusMap (std::vector<float> &map)
       {
-        return (computeMap ("getDepthRadiusMap", map, 1, &iine_maps::depth_radii));
+        return (computeMap ("getDepthRadiusMap", map, 1, &iine_maps::depth_radii,
+                            "the last compute had SEMANTICS_PCL or SIMPLE_3D_GRADIENT, which have no depth radii"));
       }
 
       /** \brief Get the eigenvalues of the covariance matrix of every pixel's window of the last computed cloud. Not in
@@ -307,7 +309,8 @@ namespace iine
       bool
       getEigenvalueMap (std::vector<float> &map)
       {
-        return (computeMap ("getEigenvalueMap", map, 3, &iine_maps::eigenvalues));
+        return (computeMap ("getEigenvalueMap", map, 3, &iine_maps::eigenvalues,
+                            "the last compute was not with COVARIANCE_MATRIX, which alone has eigenvalues"));
       }
 
       /** \brief Set the point that normals are turned towards, instead of the cloud's sensor origin.
@@ -356,7 +359,8 @@ namespace iine
       void
       setNumberOfThreads (unsigned number_of_threads)
       {
-        if (isTaken ("setNumberOfThreads", iine_estimator_set_threads (handle_.get (), number_of_threads)))
+        const int status = iine_estimator_set_threads (handle_.get (), number_of_threads);
+        if (isTaken ("setNumberOfThreads", status, number_of_threads, "at most 1024"))
           options_.number_of_threads = number_of_threads;
       }
 
@@ -380,7 +384,8 @@ namespace iine
       void
       setPaperAlpha (float alpha)
       {
-        if (isTaken ("setPaperAlpha", iine_estimator_set_paper_alpha (handle_.get (), alpha)))
+        const int status = iine_estimator_set_paper_alpha (handle_.get (), alpha);
+        if (isTaken ("setPaperAlpha", status, alpha, "finite and above 0"))
           options_.paper_alpha = alpha;
       }
 
@@ -391,7 +396,8 @@ namespace iine
       void
       setPaperBeta (float beta)
       {
-        if (isTaken ("setPaperBeta", iine_estimator_set_paper_beta (handle_.get (), beta)))
+        const int status = iine_estimator_set_paper_beta (handle_.get (), beta);
+        if (isTaken ("setPaperBeta", status, beta, "finite and above 0"))
           options_.paper_beta = beta;
       }
 
@@ -402,7 +408,8 @@ namespace iine
       void
       setPaperGamma (float gamma)
       {
-        if (isTaken ("setPaperGamma", iine_estimator_set_paper_gamma (handle_.get (), gamma)))
+        const int status = iine_estimator_set_paper_gamma (handle_.get (), gamma);
+        if (isTaken ("setPaperGamma", status, gamma, "finite and above 0"))
           options_.paper_gamma = gamma;
       }
 
@@ -419,7 +426,10 @@ namespace iine
       {
         const int status =
             iine_estimator_set_paper_radii (handle_.get (), smallest_radius, least_depth_radius, largest_radius);
-        if (!isTaken ("setPaperRadii", status))
+        const std::string radii = std::to_string (smallest_radius) + ", " + std::to_string (least_depth_radius) + ", "
+            + std::to_string (largest_radius);
+        if (!isTaken ("setPaperRadii", status, radii,
+                      "1 <= smallest_radius <= least_depth_radius <= largest_radius <= 1000"))
           return;
         options_.smallest_radius = smallest_radius;
         options_.least_depth_radius = least_depth_radius;
@@ -467,7 +477,8 @@ namespace iine
 
       /** \brief Set whether a second pass gives every pixel, but on round surfaces, that window around or beside it whose
         * plane is expected to be nearest to the surface (docs/paper.md), so that edges without a depth change stay sharp and
-        * flat surfaces become smoother. With either semantics, and the alpha of \ref setPaperAlpha and the largest radius of \ref setPaperRadii. Not in PCL's class.
+        * flat surfaces become smoother. With either semantics, and the alpha of \ref setPaperAlpha and the largest
+        * radius of \ref setPaperRadii. Not in PCL's class.
         * \param[in] crease_windows whether it does; default false
         */
       void
@@ -509,11 +520,7 @@ namespace iine
         last_status_ = checkInput ();
         if (last_status_ != IINE_OK)
         {
-          if (last_status_ == IINE_ERROR_NULL_POINTER)
-            PCL_ERROR ("[iine::%s::initCompute] No input cloud was set.\n", feature_name_.c_str ());
-          else
-            PCL_ERROR ("[iine::%s::initCompute] The cloud is not organized (height = 1), or its size is not its "
-                       "width times its height, or it is empty.\n", feature_name_.c_str ());
+          report ("initCompute", explain (last_status_));
           return (false);
         }
         // The list of all indices that the base class keeps is shared by copies: each takes its own.
@@ -525,7 +532,7 @@ namespace iine
         if (!pcl::PCLBase<PointInT>::initCompute () || (fake_indices_ && indices_->size () != input_->size ()))
         {
           last_status_ = IINE_ERROR_OUT_OF_MEMORY;
-          report ("initCompute", last_status_);
+          report ("initCompute", explain (last_status_));
           return (false);
         }
         const bool has_radius = std::fpclassify (search_radius_) != FP_ZERO;
@@ -560,7 +567,7 @@ namespace iine
         for (auto &point : output)
           clearNormal (point);
         throwIfUnsupported (last_status_);
-        report ("compute", last_status_);
+        report ("compute", explain (last_status_));
       }
 
     private:
@@ -697,12 +704,19 @@ namespace iine
         return (IINE_OK);
       }
 
-      /** \brief Whether a setter of the C API took its value; if not, an error is printed. */
-      bool
-      isTaken (const char *member, int status) const
+      /** \brief Whether a setter of the C API took its value; if not, an error is printed.
+        * \param[in] member the member function that was called
+        * \param[in] status what the setter returned
+        * \param[in] value the value
+        * \param[in] rule what values have to be
+        */
+      template <typename Value> static bool
+      isTaken (const char *member, int status, const Value &value, const char *rule)
       {
-        if (status != IINE_OK)
-          report (member, status);
+        if (status == IINE_ERROR_OPTION_VALUE)
+          reportRefused (member, value, rule);
+        else if (status != IINE_OK) // the estimator could not be made
+          report (member, explain (IINE_ERROR_OUT_OF_MEMORY));
         return (status == IINE_OK);
       }
 
@@ -799,7 +813,11 @@ namespace iine
           return;
         clearNormal (normal);
         throwIfUnsupported (last_status_);
-        report (member, last_status_);
+        if (last_status_ == IINE_ERROR_OPTION_VALUE && (rect_width_ < 0 || rect_height_ < 0))
+          reportRefused (member, std::to_string (rect_width_) + " x " + std::to_string (rect_height_),
+                         "setRectSize's sizes are 0 or above");
+        else
+          report (member, explain (last_status_));
       }
 
       /** \brief Compute one of the maps from the cloud as it is and the options of the last compute.
@@ -807,17 +825,17 @@ namespace iine
         * \param[out] map the map, empty if it cannot be had
         * \param[in] values_per_pixel how many values a pixel has
         * \param[in] field the map's field in the struct of the C API
+        * \param[in] unsupported why the last compute may have no such map
         * \return whether it was computed; if not, an error is printed
         */
       template <typename Value> bool
       computeMap (const char *member, std::vector<Value> &map, std::size_t values_per_pixel,
-                  Value *iine_maps::*field)
+                  Value *iine_maps::*field, const char *unsupported = explain (IINE_ERROR_UNSUPPORTED))
       {
         map.clear ();
         if (!has_maps_)
         {
-          PCL_ERROR ("[iine::%s::%s] Nothing has been computed from this cloud, or the last compute failed.\n",
-                     feature_name_.c_str (), member);
+          report (member, "nothing has been computed from this cloud, or the last compute failed");
           return (false);
         }
         int status = checkInput ();
@@ -835,7 +853,7 @@ namespace iine
         if (status == IINE_OK)
           return (true);
         map.clear ();
-        report (member, status);
+        report (member, status == IINE_ERROR_UNSUPPORTED ? unsupported : explain (status));
         return (false);
       }
 
@@ -856,10 +874,37 @@ namespace iine
                                "BORDER_POLICY_MIRROR.");
       }
 
-      void
-      report (const char *member, int status) const
+      /** \brief The text of a status, in this class's words where it has its own. */
+      static const char *
+      explain (int status)
       {
-        PCL_ERROR ("[iine::%s::%s] %s.\n", feature_name_.c_str (), member, iine_status_string (status));
+        switch (status)
+        {
+          case IINE_ERROR_NULL_POINTER:
+            return ("no input cloud was set");
+          case IINE_ERROR_SIZE:
+            return ("the cloud is not organized (height = 1), or its size is not its width times its height, or it is "
+                    "empty or too large");
+          case IINE_ERROR_OPTION_VALUE: // setters have refused numbers
+            return ("the method, border policy, semantics, distance metric or depth is none of the enumerators");
+          case IINE_ERROR_UNSUPPORTED: // with BORDER_POLICY_MIRROR it throws
+            return ("SIMPLE_3D_GRADIENT does not go with SEMANTICS_PAPER");
+          default:
+            return (iine_status_string (status));
+        }
+      }
+
+      static void
+      report (const char *member, const char *text)
+      {
+        PCL_ERROR ("[iine::IntegralImageNormalEstimation::%s] %s.\n", member, text);
+      }
+
+      template <typename Value> static void
+      reportRefused (const char *member, const Value &value, const char *rule)
+      {
+        PCL_ERROR_STREAM ("[iine::IntegralImageNormalEstimation::" << member << "] " << value << " is refused: " << rule
+                          << ".\n");
       }
 
       /** \brief The options set. */
