@@ -17,7 +17,7 @@
 //! missing points if it is not NaN, in units of which a metre has so many, and with a second pass if that is 1. The counts
 //! are the difference between two frames and one, so neither start nor the first frame's allocations are in them.
 
-#[path = "../benches/common/mod.rs"]
+#[path = "../benches/rust/lib.rs"]
 mod common;
 
 use std::path::Path;

@@ -231,7 +231,7 @@ compare (const std::string& what, const Normals& a, const Normals& b, std::size_
   return {quantile (angles, 0.999), only_first};
 }
 
-// The same as benches/common/mod.rs: what is seen around a pixel does not depend on the size.
+// The same as benches/rust/lib.rs: what is seen around a pixel does not depend on the size.
 Cloud::Ptr
 generated (std::uint32_t width, std::uint32_t height)
 {

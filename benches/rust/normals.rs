@@ -1,16 +1,14 @@
-//! The Rust API: `cargo bench`, or `cargo bench -- method` and so on for one group. Throughput is in pixels.
+//! The Rust API: `cargo bench -p iine-benches`, with `-- method` and so on for one group. Throughput is in pixels.
 //!
 //! Generated clouds, and the real frames of `IINE_TEST_DATA` (default `../shared/data`) that are there. One thread;
 //! depth-dependent smoothing, as in the comparison with PCL (`scripts/bench`). Every output is checked before it is
 //! timed.
 
-mod common;
-
 use std::time::Duration;
 
-use common::{Cloud, POINT};
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use iine::{BorderPolicy, Estimator, Isa, Method, Options};
+use iine_benches::{Cloud, POINT};
 use iine_scenes::real_frame;
 
 const FRAMES: [&str; 5] = [
