@@ -178,7 +178,7 @@ impl Estimator {
             return Err(Error::Index);
         }
         normal.check_disjoint(points)?;
-        // No larger than pointers of 32 bits can be added to; no image is half as large.
+        // Larger windows are clipped or folded to the same, but where they end would be no number of 32 bits.
         let [width, height] =
             [width, height].map(|side| (side as usize).min(isize::MAX as usize / 2));
         let size = (width, height);

@@ -460,8 +460,9 @@ static void test_compute_refuses(void) {
     iine_normals normals[2];
     char bytes[1];
   } place;
-  const iine_points *const odd_points = (const iine_points *)(const void *)(place.bytes + 2);
-  const iine_normals *const odd_normals = (const iine_normals *)(const void *)(place.bytes + 2);
+  const size_t half = sizeof(size_t) / 2; /* of what structs are aligned to */
+  const iine_points *const odd_points = (const iine_points *)(const void *)(place.bytes + half);
+  const iine_normals *const odd_normals = (const iine_normals *)(const void *)(place.bytes + half);
   memset(&place, 0, sizeof place);
 
   refuse(IINE_ERROR_NULL_POINTER, NULL, &good_points, &good_normals, __LINE__);

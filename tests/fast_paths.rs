@@ -50,7 +50,8 @@ impl Worst {
                 none => *none = Some(found),
             }
         }
-        assert!(first.iter().any(Option::is_some), "a fast path on every processor");
+        let least = usize::from(cfg!(target_arch = "aarch64")); // NEON fuses
+        assert!(first[least].is_some(), "the least path is always there");
         let pixels = || plain.iter().enumerate();
         let fast = first.iter().flatten();
         for (fast, (at, plain)) in fast.flat_map(|fast| fast.iter().zip(pixels())) {

@@ -2,9 +2,10 @@
 //!
 //! First the windows of a slice of the image's rows (`windows`), then tile by tile, and if need be layer by layer
 //! (`layers`), the points (`planes`, `incomplete`), the method's rings of sums (`strip_pairs`, `strips`, `moments`,
-//! `half_windows`) and, run by run (`run`), the normals (`matrices`, `gradients`; `tile`, `one_point`, `estimates`). Slices are made of whole strips; strips,
-//! tiles and layers are fixed by the frame and the options, so that results do not depend on the number of threads. Rings
-//! of integers go on from one strip to the next where a thread makes both: their sums are the same to the bit.
+//! `half_windows`) and, run by run (`run`), the normals (`matrices`, `gradients`; `tile`, `one_point`, `estimates`).
+//! Slices are made of whole strips; strips, tiles and layers are fixed by the frame and the options, so that results
+//! do not depend on the number of threads. Rings of integers go on from one strip to the next where a thread makes
+//! both: their sums are the same to the bit.
 
 mod arithmetic;
 mod buffer;
@@ -149,9 +150,10 @@ impl TileScratch {
         columns: usize,
         side: usize,
     ) -> Result<(), Error> {
-        let frame = &Frame::largest(columns, side, (job.image.width, job.image.height));
+        let &PclJob { job: Job { options, .. }, ref image, .. } = job;
+        let frame = &Frame::largest(columns, side, (image.width, image.height));
         self.planes.reserve(frame)?;
-        match job.job.options.method {
+        match options.method {
             Method::CovarianceMatrix => self.moments.reserve(frame, side),
             Method::Average3DGradient => self.strip_pairs.reserve(frame, side),
             Method::AverageDepthChange if is_integer => {
