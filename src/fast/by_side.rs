@@ -4,9 +4,10 @@ use super::arithmetic::Floats;
 use super::depth::Depth;
 use super::half_windows::{HalfWindows, Tangents};
 use super::lanes::all;
+use super::pair::{Pair, contains};
 use super::planes::{Frame, Planes};
 use super::run::OfRun;
-use super::tile::{Pair, Tile, contains};
+use super::tile::Tile;
 use crate::simd::{GROUP, Groups, Simd};
 
 /// [`Sums::note`](super::tile::Sums::note)

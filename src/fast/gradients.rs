@@ -8,9 +8,10 @@ use super::arithmetic::{Floats, Integers, between};
 use super::estimates::Found;
 use super::lanes::Bits;
 use super::lanes::LANES;
+use super::pair::Pair;
 use super::planes::Frame;
 use super::run::{Noted, RUN};
-use super::tile::{Pair, Tile};
+use super::tile::Tile;
 use crate::simd::{GROUP, Groups, Simd};
 use crate::vector::{cross, dot};
 

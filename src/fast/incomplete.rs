@@ -3,8 +3,8 @@
 
 use super::buffer::Buffer;
 use super::lanes::Bits;
+use super::pair::Pair;
 use super::planes::{Frame, window_reach};
-use super::tile::Pair;
 use crate::Error;
 use crate::cloud::Points;
 

@@ -1,16 +1,18 @@
 //! The fast form of the whole method: the same steps as the plain form, over lanes, rows and tiles.
 //!
-//! First the windows of a slice of the image's rows (`windows`), then tile by tile, and if need be layer by layer
-//! (`layers`), the points (`planes`, `incomplete`), the method's rings of sums (`strip_pairs`, `strips`, `moments`,
-//! `half_windows`) and, run by run (`run`), the normals (`matrices`, `gradients`; `tile`, `one_point`, `estimates`).
-//! Slices are made of whole strips; strips, tiles and layers are fixed by the frame and the options, so that results
-//! do not depend on the number of threads. Rings of integers go on from one strip to the next where a thread makes
-//! both: their sums are the same to the bit.
+//! First the windows of a slice of the image's rows (`windows`: `depth_changes`, `distance`, `smoothing_area`), then tile
+//! by tile, and if need be layer by layer (`layers`), the points (`planes`, `incomplete`), the method's rings of sums
+//! (`strip_pairs`, `strips`, `moments`, `half_windows`) and, run by run (`run`), the normals (`matrices`, `gradients`;
+//! `tile`, `row`, `one_point`, `estimates`). Slices are made of whole strips; strips, tiles and layers are fixed by the frame and
+//! the options, so that results do not depend on the number of threads. Rings of integers go on from one strip to the next
+//! where a thread makes both: their sums are the same to the bit.
 
 mod arithmetic;
 mod buffer;
 mod by_side;
 mod depth;
+mod depth_changes;
+mod distance;
 mod estimates;
 mod gradients;
 mod half_windows;
@@ -20,11 +22,14 @@ mod layers;
 mod matrices;
 mod moments;
 mod one_point;
+mod pair;
 pub(crate) mod paper;
 mod paths;
 mod planes;
+mod row;
 mod run;
 mod sink;
+mod smoothing_area;
 mod strip_pairs;
 mod strips;
 mod tile;

@@ -9,8 +9,9 @@ use super::estimates::Found;
 use super::gradients::{
     Both, Gradients, HORIZONTAL, LeftCorners, PIXEL, Scale, VERTICAL, place, sum_between,
 };
+use super::pair::Pair;
 use super::planes::{Frame, MARGIN, Planes};
-use super::tile::{Pair, Sums, Tile};
+use super::tile::{Sums, Tile};
 use crate::Error;
 use crate::memory::{bytes, make_room};
 use crate::methods::start;

@@ -1,16 +1,16 @@
-//! Steps 4 and 5, fast, for one tile of the image: rows of points go through rings of sums, every pair of groups of eight
-//! pixels takes its windows' sums from them, and normals are made run by run.
+//! Steps 4 and 5, fast, for one tile of the image: rows of points go through rings of sums, from which the normals of a row
+//! (`row`) are made.
 
 use std::mem;
-use std::ops::{Range, RangeInclusive};
+use std::ops::Range;
 
-use super::arithmetic::Floats;
 use super::estimates::{Estimates, Found};
 use super::lanes::{Bits, LANES, all};
 use super::layers::Layer;
-use super::one_point::of_one_point;
+use super::pair::Pair;
 use super::planes::{Frame, MARGIN, Planes, window_reach};
-use super::run::{Noted, RUN};
+use super::row::{Row, Run};
+use super::run::Noted;
 use super::sink::Sink;
 use super::windows::Sides;
 use crate::Error;
@@ -21,7 +21,7 @@ use crate::options::Options;
 use crate::paper::Marks;
 use crate::plain::of_own_window;
 use crate::rect::Rect;
-use crate::simd::{GROUP, Groups, Simd};
+use crate::simd::{Groups, Simd};
 use crate::window::Image;
 
 /// A method's sums over windows, from rings of integral rows. Each method says what it keeps a ring of.
@@ -216,7 +216,7 @@ impl Tile<'_> {
     /// # Safety
     /// As [`Tile::compute`].
     #[inline(always)]
-    unsafe fn write<S: Groups>(
+    pub unsafe fn write<S: Groups>(
         &self,
         sink: &Sink,
         pixel: (usize, usize),
@@ -315,7 +315,7 @@ impl Tile<'_> {
 
     /// Those of some lanes from pixel `(x, y)` on that are a layer's, and are left if only some are.
     #[cold]
-    fn of_layer(&self, layer: &Layer, (x, y): (usize, usize), lanes: u32) -> u32 {
+    pub fn of_layer(&self, layer: &Layer, (x, y): (usize, usize), lanes: u32) -> u32 {
         Bits(lanes).which(|lane| {
             let x = x + lane;
             self.left.is_none_or(|left| left.has((x, y))) && layer.has(self.points.z(x, y))
@@ -323,7 +323,7 @@ impl Tile<'_> {
     }
 
     /// What a pixel's window and the pixels around it cover.
-    fn around(&self, ((x, y), side): ((usize, usize), usize)) -> Rect {
+    pub fn around(&self, ((x, y), side): ((usize, usize), usize)) -> Rect {
         let Image { width, height, .. } = *self.image;
         let (before, after) = window_reach(side);
         let reached =
@@ -332,7 +332,7 @@ impl Tile<'_> {
     }
 
     /// The points of a pixel's window, all of which are finite.
-    fn points_in(
+    pub fn points_in(
         &self,
         (pixel, side): ((usize, usize), usize),
     ) -> impl Iterator<Item = [f64; 3]> + use<'_> {
@@ -343,7 +343,7 @@ impl Tile<'_> {
 
     /// The normals of some lanes of those that begin with pixel `(x, y)`, by the plain form.
     #[cold]
-    fn plain_lanes(&self, estimates: &mut Estimates, (x, y): (usize, usize), lanes: u32) {
+    pub fn plain_lanes(&self, estimates: &mut Estimates, (x, y): (usize, usize), lanes: u32) {
         for lane in Bits(lanes) {
             let pixel = (x + lane, y);
             let side = self.sides.row(y)[pixel.0];
@@ -401,269 +401,8 @@ impl Tile<'_> {
     }
 }
 
-/// A row of a layer of a tile, that the sums are aimed at.
-struct Row<'a, M: Sums> {
-    tile: &'a Tile<'a>,
-    layer: &'a Layer,
-    y: usize,
-    frame: &'a Frame,
-    planes: &'a Planes,
-    sums: &'a M,
-    sink: &'a Sink<'a>,
-}
-
-impl<M: Sums> Row<'_, M> {
-    /// Computes the row that the sums are aimed at. Whether windows may hold incomplete points, `incomplete` tells.
-    ///
-    /// # Safety
-    /// As [`Tile::compute`].
-    #[inline(always)]
-    unsafe fn compute<S: Groups>(&self, run: &mut Run<M>, inner: &Range<usize>, incomplete: bool) {
-        let &Row { tile, layer, y, frame, planes, sums, sink } = self;
-        let row = tile.sides.row(y);
-        for start in tile.columns.clone().step_by(RUN) {
-            run.length = 0;
-            for x in (start..tile.columns.end.min(start + RUN)).step_by(LANES) {
-                // SAFETY: as the caller's; a row of sides is readable up to a whole pair of groups.
-                unsafe {
-                    let mut pair = Pair::new::<S>(tile, row, x, y, inner);
-                    let mut written = all((tile.columns.end - x).min(LANES));
-                    if !layer.is_all() || tile.left.is_some() {
-                        pair.windows = tile.of_layer(layer, (x, y), pair.windows);
-                        written = pair.windows;
-                    }
-                    let windows = pair.windows;
-                    let mut plain = 0;
-                    if incomplete {
-                        plain = planes.incomplete.in_windows(frame, &pair);
-                        pair.windows &= !plain;
-                    }
-                    if windows == 0 {
-                        tile.write::<S>(sink, (x, y), written, &Estimates::NONE);
-                        continue;
-                    }
-                    let at = run.length * LANES;
-                    if pair.windows != 0 {
-                        plain |= sums.note::<S>(tile, frame, planes, &pair, &mut run.sums, at);
-                    }
-                    run.places[run.length] = (x, windows, written);
-                    run.lanes[run.length] = windows & !plain;
-                    run.length += 1;
-                }
-            }
-            // SAFETY: as the caller's.
-            unsafe { self.finish::<S>(run) };
-        }
-    }
-
-    /// Writes the normals of a run.
-    ///
-    /// # Safety
-    /// As [`Tile::compute`].
-    #[inline(always)]
-    unsafe fn finish<S: Groups>(&self, run: &mut Run<M>) {
-        let &Row { tile, y, sums, sink, .. } = self;
-        let (row, points) = (tile.sides.row(y), self.planes.rows(self.frame, y));
-        let (mut rest, mut any_rest) = ([0; RUN / LANES], 0);
-        // SAFETY: as the caller's; the rows are readable up to a whole pair of groups.
-        unsafe {
-            run.sums.solve::<S>(0, &run.lanes[..run.length]);
-            for number in 0..run.length {
-                let (x, windows, written) = run.places[number];
-                let sides = S::Pair::load(row.as_ptr().add(x));
-                let found = sums.estimate::<S::Pair>(&run.sums, number * LANES, sides, false);
-                rest[number] = windows & !(run.lanes[number] & !found.doubtful);
-                any_rest |= rest[number];
-                let normals = self.turned::<S>(found, x, windows, points);
-                tile.write::<S>(sink, (x, y), written, &normals);
-            }
-            if any_rest == 0 {
-                return;
-            }
-            for number in 0..run.length {
-                if rest[number] != 0 {
-                    self.settle::<S>(run, number, rest[number]);
-                }
-            }
-        }
-    }
-
-    /// Writes the normals of a pair of a run, of the lanes `rest`, that are doubtful or left to the plain form: apart, as
-    /// what is held in registers for it would cost all others 1 to 5 %.
-    ///
-    /// # Safety
-    /// As [`Tile::compute`].
-    #[inline(always)]
-    unsafe fn settle<S: Groups>(&self, run: &mut Run<M>, number: usize, rest: u32) {
-        let &Row { tile, y, sums, sink, .. } = self;
-        let Run { sums: of_run, places, lanes, .. } = run;
-        let ((x, ..), lanes, at) = (places[number], lanes[number], number * LANES);
-        let row = tile.sides.row(y);
-        let window = |lane: usize| ((x + lane, y), row[x + lane] as usize);
-        // SAFETY: as the caller's.
-        unsafe {
-            let sides = S::Pair::load(row.as_ptr().add(x));
-            let mut found = sums.estimate::<S::Pair>(of_run, at, sides, false);
-            let (mut doubtful, mut of_one) = (rest & lanes, 0);
-            if doubtful != 0 {
-                let around = |lane: usize| (window(lane).0, tile.around(window(lane)));
-                of_one = of_one_point::<S::Widest>(tile.points, doubtful, around);
-                doubtful &= !of_one;
-            }
-            if doubtful != 0 {
-                let points = |lane: usize| tile.points_in(window(lane));
-                if of_run.afresh::<S, _>(at, doubtful, points) {
-                    let fresh = sums.estimate::<S::Pair>(of_run, at, sides, true);
-                    doubtful = found.take_certain(doubtful, &fresh);
-                }
-                doubtful = found.take_precise(doubtful, |lane| {
-                    let precise = of_run.precisely(at + lane);
-                    precise.or_else(|| sums.precisely(tile, window(lane)))
-                });
-            }
-            let plain = rest & !lanes | doubtful;
-            let points = self.planes.rows(self.frame, y);
-            let mut normals = self.turned::<S>(found, x, rest & !of_one & !plain, points);
-            let curvature = if M::CURVATURE { 0.0 } else { f32::NAN };
-            for lane in Bits(of_one) {
-                normals.put(lane, Estimate { curvature, ..Estimate::NONE });
-            }
-            if plain != 0 {
-                tile.plain_lanes(&mut normals, (x, y), plain);
-            }
-            tile.write::<S>(sink, (x, y), rest, &normals);
-        }
-    }
-
-    /// What was found for these lanes of a pair, turned to the viewpoint; `points` are the row's.
-    ///
-    /// # Safety
-    /// As [`Tile::compute`].
-    #[inline(always)]
-    unsafe fn turned<S: Groups>(
-        &self,
-        found: Found<S::Pair>,
-        x: usize,
-        lanes: u32,
-        [xs, ys, zs]: [&[f32]; 3],
-    ) -> Estimates {
-        let column = self.frame.column(x);
-        // SAFETY: as the caller's; the rows are readable up to a whole pair of groups.
-        unsafe {
-            let point = [
-                Floats::load(xs.as_ptr().add(column)),
-                Floats::load(ys.as_ptr().add(column)),
-                Floats::load(zs.as_ptr().add(column)),
-            ];
-            Estimates::of(found, point, self.tile.options.viewpoint, lanes)
-        }
-    }
-}
-
 /// A range from its middle on, and then what is before it, backwards.
 pub(crate) fn from_middle(range: &Range<usize>) -> impl Iterator<Item = usize> + use<> {
     let middle = range.start.midpoint(range.end);
     (middle..range.end).chain((range.start..middle).rev())
-}
-
-/// Whether a range has all of another, which is not empty.
-#[inline(always)]
-pub(crate) fn contains(range: &Range<usize>, other: RangeInclusive<usize>) -> bool {
-    range.start <= *other.start() && *other.end() < range.end
-}
-
-/// Pixels of a row, without pairs of groups that have no window. Their normals are found step by step, each step for
-/// all of them: what one pixel's step waits for does not hold up the others'.
-struct Run<M: Sums> {
-    sums: M::OfRun,
-    /// Where the pairs begin, the lanes that have a window, and those that are written.
-    places: [(usize, u32, u32); RUN / LANES],
-    /// The lanes that are not left to the plain form.
-    lanes: [u32; RUN / LANES],
-    /// In pairs.
-    length: usize,
-}
-
-impl<M: Sums> Default for Run<M> {
-    fn default() -> Self {
-        let (places, lanes) = ([(0, 0, 0); RUN / LANES], [0; RUN / LANES]);
-        Run { sums: M::OfRun::default(), places, lanes, length: 0 }
-    }
-}
-
-/// Two groups of pixels of a row, side by side, and their windows.
-pub(crate) struct Pair<'a> {
-    /// The first pixel.
-    pub x: usize,
-    pub y: usize,
-    /// The sides of the row's windows.
-    pub row: &'a [f32],
-    /// The lanes that have a window.
-    pub windows: u32,
-    /// The columns where windows of any of the tile's sides are inside the image.
-    inner: &'a Range<usize>,
-}
-
-impl<'a> Pair<'a> {
-    /// # Safety
-    /// The processor has the instruction set of `S`; the row is readable from `x` up to a whole pair.
-    #[inline(always)]
-    unsafe fn new<S: Groups>(
-        tile: &Tile,
-        row: &'a [f32],
-        x: usize,
-        y: usize,
-        inner: &'a Range<usize>,
-    ) -> Self {
-        let count = (tile.columns.end - x).min(LANES);
-        // SAFETY: as the caller's.
-        let sides = unsafe { S::Pair::load(row.as_ptr().add(x)) };
-        // SAFETY: as the caller's.
-        let windows = unsafe { S::Pair::bits(S::Pair::lt(S::Pair::splat(0.0), sides)) };
-        Pair { x, y, row, windows: windows & all(count), inner }
-    }
-
-    /// A lane's pixel and the side of its window.
-    pub fn window(&self, lane: usize) -> ((usize, usize), usize) {
-        let x = self.x + lane;
-        ((x, self.y), self.row[x] as usize)
-    }
-
-    /// The side of the windows of `lanes`, if they have the same and windows of any of the tile's sides are inside the image
-    /// here.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    pub unsafe fn one_side<S: Groups>(&self, lanes: u32) -> Option<usize> {
-        let side = self.row[self.x + lanes.trailing_zeros() as usize];
-        // SAFETY: as the caller's; sides are whole numbers that fit i32.
-        unsafe {
-            let sides = S::Pair::load(self.row.as_ptr().add(self.x));
-            let same = S::Pair::bits(S::Pair::eq(sides, S::Pair::splat(side)));
-            let have_one = lanes & !same == 0 && self.is_inner(0, LANES);
-            have_one.then(|| side.to_int_unchecked::<i32>() as usize)
-        }
-    }
-
-    /// The sides of the windows of `lanes`, of the group that begins with lane `first`; 0 in the others.
-    ///
-    /// # Safety
-    /// The processor has the instruction set of `S`.
-    #[inline(always)]
-    pub unsafe fn sides<S: Groups>(&self, first: usize, lanes: u32) -> [i32; GROUP] {
-        let mut sides = [0; GROUP];
-        // SAFETY: as the caller's; sides are whole numbers that fit i32.
-        unsafe {
-            let row = S::load(self.row.as_ptr().add(self.x + first));
-            S::store_i(sides.as_mut_ptr(), S::truncate_i(S::and(S::mask(lanes), row)));
-        }
-        sides
-    }
-
-    /// Whether windows of any of the tile's sides are inside the image for so many pixels from a lane on.
-    #[inline(always)]
-    pub fn is_inner(&self, lane: usize, count: usize) -> bool {
-        contains(self.inner, self.x + lane..=self.x + lane + count - 1)
-    }
 }

@@ -1,7 +1,7 @@
 //! Depth changes as the semantics tell them, fast: the plain forms are in `paper` and `paper::depth_change`.
 
 use super::windows;
-use crate::fast::windows::threshold;
+use crate::fast::depth_changes::threshold;
 use crate::options::{Options, Semantics};
 use crate::paper::{between as plain_between, mark};
 use crate::simd::Simd;
