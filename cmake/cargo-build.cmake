@@ -12,12 +12,17 @@ else()
   unset(ENV{CARGO_BUILD_TARGET})
 endif()
 
-# Panics name source files: those of other crates and of Rust's library not by where this machine has them. The user's
-# flags stay: this is added to them where cargo reads them, and not at all if it would be split at a space.
+# The user's flags stay: these are added to them where cargo reads them.
 set(flags CARGO_BUILD_RUSTFLAGS)
 if(DEFINED ENV{RUSTFLAGS})
   set(flags RUSTFLAGS)
 endif()
+if(RUST_TARGET)
+  list(JOIN LINK_ARGUMENTS " " link_arguments)
+  set(ENV{${flags}} "$ENV{${flags}} ${link_arguments}")
+endif()
+# Panics name source files: those of other crates and of Rust's library not by where this machine has them. Not at all if
+# it would be split at a space.
 foreach(name cargo rustup)
   string(TOUPPER ${name}_HOME variable)
   set(home $ENV{HOME}/.${name})
@@ -28,7 +33,6 @@ foreach(name cargo rustup)
     set(ENV{${flags}} "$ENV{${flags}} --remap-path-prefix=${home}=/${name}")
   endif()
 endforeach()
-
 execute_process(COMMAND ${CARGO} ${arguments} RESULT_VARIABLE result)
 if(NOT result EQUAL 0)
   message(FATAL_ERROR "cargo build failed")
