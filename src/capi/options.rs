@@ -5,37 +5,42 @@ use super::estimator::iine_estimator;
 use crate::options::is_positive;
 use crate::{BorderPolicy, Depth, DistanceMetric, Error, Method, Options, PaperOptions, Semantics};
 
-/// Changes one option, after `change` has said that its value is in range.
+/// Sets one option, if its value is in range.
 ///
 /// # Safety
 /// `estimator` is NULL or a live estimator that no other thread uses.
-unsafe fn set(
+unsafe fn set<T>(
     estimator: *mut iine_estimator,
-    change: impl FnOnce(&mut Options) -> Result<(), Error>,
+    option: impl FnOnce(&mut Options) -> &mut T,
+    value: Result<T, Error>,
 ) -> i32 {
     guard(|| {
         // SAFETY: promised by the caller.
-        change(unsafe { reference_mut(estimator) }?.estimator.options_mut())
+        let options = unsafe { reference_mut(estimator) }?.estimator.options_mut();
+        *option(options) = value?;
+        Ok(())
     })
 }
 
-/// As [`set`], for the parameters of the paper's semantics, which are in range or not together.
+/// Sets parameters of the paper's semantics, which are in range or not together.
 ///
 /// # Safety
 /// `estimator` is NULL or a live estimator that no other thread uses.
-unsafe fn set_paper(
-    estimator: *mut iine_estimator,
-    change: impl FnOnce(&mut PaperOptions) -> Result<(), Error>,
-) -> i32 {
-    let change = |options: &mut Options| {
+unsafe fn set_paper(estimator: *mut iine_estimator, change: impl FnOnce(&mut PaperOptions)) -> i32 {
+    guard(|| {
+        // SAFETY: promised by the caller.
+        let options = unsafe { reference_mut(estimator) }?.estimator.options_mut();
         let mut paper = options.paper.clone();
-        change(&mut paper)?;
+        change(&mut paper);
         paper.check()?;
         options.paper = paper;
         Ok(())
-    };
-    // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
+    })
+}
+
+/// The value, if it is in range.
+fn checked<T>(value: T, is_in_range: bool) -> Result<T, Error> {
+    if is_in_range { Ok(value) } else { Err(Error::OptionValue) }
 }
 
 /// The value that has this number: `all` are in the order of theirs, from 0.
@@ -45,11 +50,7 @@ fn known<T: Copy>(all: &[T], number: i32) -> Result<T, Error> {
 }
 
 fn switch(number: i32) -> Result<bool, Error> {
-    match number {
-        0 => Ok(false),
-        1 => Ok(true),
-        _ => Err(Error::OptionValue),
-    }
+    known(&[false, true], number)
 }
 
 /// Sets the method: one of IINE_METHOD_*; default IINE_METHOD_AVERAGE_3D_GRADIENT.
@@ -63,12 +64,9 @@ pub unsafe extern "C" fn iine_estimator_set_method(
     estimator: *mut iine_estimator,
     method: i32,
 ) -> i32 {
-    let change = |options: &mut Options| {
-        options.method = known(&Method::ALL, method)?;
-        Ok(())
-    };
+    let value = known(&Method::ALL, method);
     // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
+    unsafe { set(estimator, |options| &mut options.method, value) }
 }
 
 /// Sets the border policy: one of IINE_BORDER_POLICY_*; default IINE_BORDER_POLICY_IGNORE.
@@ -82,12 +80,9 @@ pub unsafe extern "C" fn iine_estimator_set_border_policy(
     estimator: *mut iine_estimator,
     border_policy: i32,
 ) -> i32 {
-    let change = |options: &mut Options| {
-        options.border_policy = known(&BorderPolicy::ALL, border_policy)?;
-        Ok(())
-    };
+    let value = known(&BorderPolicy::ALL, border_policy);
     // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
+    unsafe { set(estimator, |options| &mut options.border_policy, value) }
 }
 
 /// Sets the smoothing size in pixels: finite, above 0; default 10. The side of a pixel's window is
@@ -104,15 +99,9 @@ pub unsafe extern "C" fn iine_estimator_set_normal_smoothing_size(
     estimator: *mut iine_estimator,
     normal_smoothing_size: f32,
 ) -> i32 {
-    let change = |options: &mut Options| {
-        if !is_positive(normal_smoothing_size) {
-            return Err(Error::OptionValue);
-        }
-        options.normal_smoothing_size = normal_smoothing_size;
-        Ok(())
-    };
+    let value = checked(normal_smoothing_size, is_positive(normal_smoothing_size));
     // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
+    unsafe { set(estimator, |options| &mut options.normal_smoothing_size, value) }
 }
 
 /// Whether a tenth of a pixel's z (signed, in the cloud's unit) is added to its smoothing size: 0 (the default)
@@ -127,12 +116,9 @@ pub unsafe extern "C" fn iine_estimator_set_depth_dependent_smoothing(
     estimator: *mut iine_estimator,
     depth_dependent_smoothing: i32,
 ) -> i32 {
-    let change = |options: &mut Options| {
-        options.depth_dependent_smoothing = switch(depth_dependent_smoothing)?;
-        Ok(())
-    };
+    let value = switch(depth_dependent_smoothing);
     // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
+    unsafe { set(estimator, |options| &mut options.depth_dependent_smoothing, value) }
 }
 
 /// Sets the factor of the depth change threshold: two neighbours are a depth change apart if their z differ by
@@ -148,12 +134,10 @@ pub unsafe extern "C" fn iine_estimator_set_max_depth_change_factor(
     estimator: *mut iine_estimator,
     max_depth_change_factor: f32,
 ) -> i32 {
-    let change = |options: &mut Options| {
-        options.max_depth_change_factor = max_depth_change_factor;
-        Ok(())
-    };
     // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
+    unsafe {
+        set(estimator, |options| &mut options.max_depth_change_factor, Ok(max_depth_change_factor))
+    }
 }
 
 /// Sets the point that normals are turned towards, in the cloud's coordinates. Any numbers; default (0, 0, 0).
@@ -169,12 +153,8 @@ pub unsafe extern "C" fn iine_estimator_set_viewpoint(
     y: f32,
     z: f32,
 ) -> i32 {
-    let change = |options: &mut Options| {
-        options.viewpoint = [x, y, z];
-        Ok(())
-    };
     // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
+    unsafe { set(estimator, |options| &mut options.viewpoint, Ok([x, y, z])) }
 }
 
 /// Sets the number of threads: 1 (the default) computes on the calling thread, 0 takes one per processor. The result
@@ -192,16 +172,10 @@ pub unsafe extern "C" fn iine_estimator_set_threads(
     estimator: *mut iine_estimator,
     threads: u32,
 ) -> i32 {
-    let change = |options: &mut Options| {
-        let threads = threads as usize;
-        if threads > Options::MOST_THREADS {
-            return Err(Error::OptionValue);
-        }
-        options.threads = threads;
-        Ok(())
-    };
+    let threads = threads as usize;
+    let value = checked(threads, threads <= Options::MOST_THREADS);
     // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
+    unsafe { set(estimator, |options| &mut options.threads, value) }
 }
 
 /// Sets whose definition of the windows and sums is followed: one of IINE_SEMANTICS_*; default IINE_SEMANTICS_PCL.
@@ -219,12 +193,9 @@ pub unsafe extern "C" fn iine_estimator_set_semantics(
     estimator: *mut iine_estimator,
     semantics: i32,
 ) -> i32 {
-    let change = |options: &mut Options| {
-        options.semantics = known(&Semantics::ALL, semantics)?;
-        Ok(())
-    };
+    let value = known(&Semantics::ALL, semantics);
     // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
+    unsafe { set(estimator, |options| &mut options.semantics, value) }
 }
 
 /// Sets alpha: the smallest depth change that the sensor can tell at depth d is alpha d^2 (Eq. 4). In 1/unit of
@@ -241,12 +212,8 @@ pub unsafe extern "C" fn iine_estimator_set_paper_alpha(
     estimator: *mut iine_estimator,
     alpha: f32,
 ) -> i32 {
-    let change = |paper: &mut PaperOptions| {
-        paper.alpha = alpha;
-        Ok(())
-    };
     // SAFETY: promised by the caller.
-    unsafe { set_paper(estimator, change) }
+    unsafe { set_paper(estimator, |paper| paper.alpha = alpha) }
 }
 
 /// Sets beta: the radius of the window in pixels is beta alpha d^2 (Eq. 5). In pixels/unit of length; finite,
@@ -261,12 +228,8 @@ pub unsafe extern "C" fn iine_estimator_set_paper_beta(
     estimator: *mut iine_estimator,
     beta: f32,
 ) -> i32 {
-    let change = |paper: &mut PaperOptions| {
-        paper.beta = beta;
-        Ok(())
-    };
     // SAFETY: promised by the caller.
-    unsafe { set_paper(estimator, change) }
+    unsafe { set_paper(estimator, |paper| paper.beta = beta) }
 }
 
 /// Sets gamma: neighbours whose depths differ by gamma alpha d^2 or more are a depth change apart (Eq. 6); with
@@ -281,12 +244,8 @@ pub unsafe extern "C" fn iine_estimator_set_paper_gamma(
     estimator: *mut iine_estimator,
     gamma: f32,
 ) -> i32 {
-    let change = |paper: &mut PaperOptions| {
-        paper.gamma = gamma;
-        Ok(())
-    };
     // SAFETY: promised by the caller.
-    unsafe { set_paper(estimator, change) }
+    unsafe { set_paper(estimator, |paper| paper.gamma = gamma) }
 }
 
 /// Sets the limits of the window's radius, in pixels: where it is below `smallest_radius` there is no window;
@@ -310,7 +269,6 @@ pub unsafe extern "C" fn iine_estimator_set_paper_radii(
         paper.smallest_radius = smallest_radius;
         paper.least_depth_radius = least_depth_radius;
         paper.largest_radius = largest_radius;
-        Ok(())
     };
     // SAFETY: promised by the caller.
     unsafe { set_paper(estimator, change) }
@@ -328,12 +286,9 @@ pub unsafe extern "C" fn iine_estimator_set_paper_distance_metric(
     estimator: *mut iine_estimator,
     distance_metric: i32,
 ) -> i32 {
-    let change = |paper: &mut PaperOptions| {
-        paper.distance_metric = known(&DistanceMetric::ALL, distance_metric)?;
-        Ok(())
-    };
+    let value = known(&DistanceMetric::ALL, distance_metric);
     // SAFETY: promised by the caller.
-    unsafe { set_paper(estimator, change) }
+    unsafe { set(estimator, |options| &mut options.paper.distance_metric, value) }
 }
 
 /// Sets what a point's depth is with IINE_SEMANTICS_PAPER: one of IINE_DEPTH_*; default IINE_DEPTH_Z.
@@ -347,12 +302,9 @@ pub unsafe extern "C" fn iine_estimator_set_paper_depth(
     estimator: *mut iine_estimator,
     depth: i32,
 ) -> i32 {
-    let change = |paper: &mut PaperOptions| {
-        paper.depth = known(&Depth::ALL, depth)?;
-        Ok(())
-    };
+    let value = known(&Depth::ALL, depth);
     // SAFETY: promised by the caller.
-    unsafe { set_paper(estimator, change) }
+    unsafe { set(estimator, |options| &mut options.paper.depth, value) }
 }
 
 /// Whether points at (0, 0, 0) are missing, as LiDARs and some depth cameras write them: 0 (the default) or 1.
@@ -366,12 +318,9 @@ pub unsafe extern "C" fn iine_estimator_set_zero_is_missing(
     estimator: *mut iine_estimator,
     zero_is_missing: i32,
 ) -> i32 {
-    let change = |options: &mut Options| {
-        options.zero_is_missing = switch(zero_is_missing)?;
-        Ok(())
-    };
+    let value = switch(zero_is_missing);
     // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
+    unsafe { set(estimator, |options| &mut options.zero_is_missing, value) }
 }
 
 /// Whether pixels near a depth change get a window on their own side of it, so that every pixel with two neighbours on its
@@ -388,12 +337,9 @@ pub unsafe extern "C" fn iine_estimator_set_one_sided_windows(
     estimator: *mut iine_estimator,
     one_sided_windows: i32,
 ) -> i32 {
-    let change = |options: &mut Options| {
-        options.one_sided_windows = switch(one_sided_windows)?;
-        Ok(())
-    };
+    let value = switch(one_sided_windows);
     // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
+    unsafe { set(estimator, |options| &mut options.one_sided_windows, value) }
 }
 
 /// Whether a second pass gives every pixel, but on round surfaces, that window around or beside it whose plane is expected to
@@ -410,12 +356,9 @@ pub unsafe extern "C" fn iine_estimator_set_crease_windows(
     estimator: *mut iine_estimator,
     crease_windows: i32,
 ) -> i32 {
-    let change = |options: &mut Options| {
-        options.crease_windows = switch(crease_windows)?;
-        Ok(())
-    };
+    let value = switch(crease_windows);
     // SAFETY: promised by the caller.
-    unsafe { set(estimator, change) }
+    unsafe { set(estimator, |options| &mut options.crease_windows, value) }
 }
 
 /// The alpha of a stereo or structured light sensor: disparity_step / (focal * baseline), as its depth is
