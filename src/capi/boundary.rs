@@ -17,37 +17,33 @@ pub(super) fn guard(body: impl FnOnce() -> Result<(), Error>) -> i32 {
 /// # Safety
 /// `pointer` is NULL or valid for reads for `'a`, and nobody writes to it meanwhile.
 pub(super) unsafe fn reference<'a, T>(pointer: *const T) -> Result<&'a T, Error> {
-    check_aligned(pointer)?;
+    check(pointer)?;
     // SAFETY: promised by the caller; NULL and misaligned pointers were refused.
-    unsafe { pointer.as_ref() }.ok_or(Error::NullPointer)
+    Ok(unsafe { &*pointer })
 }
 
 /// # Safety
 /// `pointer` is NULL or valid for reads and writes for `'a`, and nobody else uses it meanwhile.
 pub(super) unsafe fn reference_mut<'a, T>(pointer: *mut T) -> Result<&'a mut T, Error> {
-    check_aligned(pointer)?;
+    check(pointer)?;
     // SAFETY: promised by the caller; NULL and misaligned pointers were refused.
-    unsafe { pointer.as_mut() }.ok_or(Error::NullPointer)
+    Ok(unsafe { &mut *pointer })
 }
 
 /// # Safety
 /// `pointer` is NULL or valid for one write.
 pub(super) unsafe fn write<T>(pointer: *mut T, value: T) -> Result<(), Error> {
-    check_writable(pointer)?;
+    check(pointer)?;
     // SAFETY: promised by the caller; NULL and misaligned pointers were refused.
     unsafe { pointer.write(value) };
     Ok(())
 }
 
-/// Refuses a place that [`write`] would refuse, before the work is done.
-pub(super) fn check_writable<T>(pointer: *mut T) -> Result<(), Error> {
+/// Refuses NULL, and a pointer that is not aligned to its type.
+pub(super) fn check<T>(pointer: *const T) -> Result<(), Error> {
     if pointer.is_null() {
         return Err(Error::NullPointer);
     }
-    check_aligned(pointer)
-}
-
-fn check_aligned<T>(pointer: *const T) -> Result<(), Error> {
     if pointer.is_aligned() { Ok(()) } else { Err(Error::Misaligned) }
 }
 
@@ -56,14 +52,8 @@ fn check_aligned<T>(pointer: *const T) -> Result<(), Error> {
 ///
 /// # Safety
 /// `pointer` is NULL, or points to a `usize` followed by as many bytes as that number, itself included, says.
-pub(super) unsafe fn read_sized<T: Sized + Copy>(
-    pointer: *const T,
-    sizes: &[usize],
-) -> Result<T, Error> {
-    if pointer.is_null() {
-        return Err(Error::NullPointer);
-    }
-    check_aligned(pointer)?;
+pub(super) unsafe fn read_sized<T: Copy>(pointer: *const T, sizes: &[usize]) -> Result<T, Error> {
+    check(pointer)?;
     // SAFETY: the struct starts with its size, and the pointer is neither NULL nor misaligned.
     let size = unsafe { pointer.cast::<usize>().read() };
     if !sizes.contains(&size) {

@@ -2,7 +2,7 @@
 
 use std::alloc::{Layout, alloc};
 
-use super::boundary::{check_writable, guard, read_sized, reference, reference_mut, write};
+use super::boundary::{check, guard, read_sized, reference, reference_mut, write};
 use super::types::{iine_maps, iine_normals, iine_points};
 use crate::{Error, Estimator, Maps, Normals, Options, Points};
 
@@ -23,7 +23,7 @@ pub struct iine_estimator {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn iine_estimator_new(estimator: *mut *mut iine_estimator) -> i32 {
     guard(|| {
-        check_writable(estimator)?;
+        check(estimator)?;
         // SAFETY: it has a size.
         let new = unsafe { alloc(Layout::new::<iine_estimator>()) }.cast::<iine_estimator>();
         if new.is_null() {
@@ -130,8 +130,7 @@ pub unsafe extern "C" fn iine_estimator_compute_indices(
         if count == 0 {
             return Ok(());
         }
-        // SAFETY: promised by the caller.
-        unsafe { reference(indices) }?;
+        check(indices)?;
         if count > isize::MAX as usize / size_of::<i32>() {
             return Err(Error::Size);
         }
@@ -267,7 +266,7 @@ unsafe fn optional_slice<'a, T>(
     if pointer.is_null() {
         return Ok(None);
     }
-    check_writable(pointer)?;
+    check(pointer)?;
     // SAFETY: promised by the caller; the length passed as a count of pixels, so its bytes fit.
     Ok(Some(unsafe { std::slice::from_raw_parts_mut(pointer, length) }))
 }
