@@ -1,6 +1,6 @@
 //! The eigenvector of the smallest eigenvalue of a symmetric 3x3 matrix.
 
-use crate::vector::difference;
+use crate::vector::{difference, sum};
 
 /// A symmetric 3x3 matrix: its upper triangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,21 +58,14 @@ pub(crate) struct Scatter {
 impl Scatter {
     /// In two passes over the points. None without points.
     pub fn of<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> Option<Self> {
-        let (mut mean, mut count) = ([0.0; 3], 0.0);
-        points().for_each(|point| {
-            for i in 0..3 {
-                mean[i] += point[i];
-            }
-            count += 1.0;
-        });
+        let (mut total, mut count) = ([0.0; 3], 0.0);
+        points().for_each(|point| (total, count) = (sum(total, point), count + 1.0));
         if count == 0.0 {
             return None;
         }
-        mean = mean.map(|sum| sum / count);
+        let mean = total.map(|total| total / count);
         let mut matrix = Symmetric3::default();
-        points().for_each(|point| {
-            matrix.add_outer(difference(point, mean));
-        });
+        points().for_each(|point| matrix.add_outer(difference(point, mean)));
         Some(Scatter { matrix, mean, count })
     }
 

@@ -10,6 +10,7 @@ use crate::methods::finite_point;
 use crate::paper::{ROUNDING, SummedArea};
 use crate::rect::Rect;
 use crate::threads::Workers;
+use crate::vector::{difference, sum};
 
 /// Rows of a band at least: those that its windows reach around it are summed with it.
 const BAND_ROWS: usize = 64;
@@ -64,7 +65,7 @@ impl Band {
         self.top = rows.start;
         self.sums.sum_up(width, rows.len(), &Workers::default(), |(x, y)| {
             finite_point(points, (x, y + rows.start)).map_or([0.0; 10], |point| {
-                let [x, y, z]: [f64; 3] = std::array::from_fn(|i| point[i] - origin[i]);
+                let [x, y, z] = difference(point, origin);
                 [1.0, x, y, z, x * x, x * y, x * z, y * y, y * z, z * z]
             })
         })?;
@@ -82,9 +83,7 @@ impl Band {
         let mut sums = [0.0; 10];
         for Rect { x, y } in window.clone() {
             let rect = Rect { x, y: y.start - self.top..y.end - self.top };
-            for (sum, of_rect) in sums.iter_mut().zip(self.sums.sum(&rect)) {
-                *sum += of_rect;
-            }
+            sums = sum(sums, self.sums.sum(&rect));
         }
         let [count, x, y, z, xx, xy, xz, yy, yz, zz] = sums;
         if count == 0.0 {

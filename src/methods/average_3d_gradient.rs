@@ -3,6 +3,7 @@
 use super::{Estimate, is_finite, normal_of_tangents, start};
 use crate::cloud::Points;
 use crate::rect::Rect;
+use crate::vector::{difference, sum};
 use crate::window::Image;
 
 /// The plain form: sums P(x+1, y) - P(x-1, y) and P(x, y+1) - P(x, y-1) over the window.
@@ -54,10 +55,8 @@ pub(crate) fn estimate_of_finite(
 }
 
 /// Adds the difference between two points to a sum, if both are there.
-fn add(sum: &mut [f64; 3], ahead: [f32; 3], behind: [f32; 3]) {
+fn add(to: &mut [f64; 3], ahead: [f32; 3], behind: [f32; 3]) {
     if is_finite(ahead) && is_finite(behind) {
-        for i in 0..3 {
-            sum[i] += f64::from(ahead[i]) - f64::from(behind[i]);
-        }
+        *to = sum(*to, difference(ahead.map(f64::from), behind.map(f64::from)));
     }
 }

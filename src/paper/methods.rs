@@ -5,6 +5,7 @@ use crate::eigen::{Scatter, eigen};
 use crate::methods::{Estimate, normal_of_tangents};
 use crate::options::Method;
 use crate::rect::{Rect, are_in_line};
+use crate::vector::{difference, sum};
 
 /// The estimate of a method of the paper; of SIMPLE_3D_GRADIENT, which it does not have, by the 3-D gradient.
 pub(crate) fn estimate(method: Method, cloud: &Cleaned, rect: &Rect) -> Estimate {
@@ -44,10 +45,7 @@ pub(crate) fn plane_of<I: Iterator<Item = [f64; 3]>>(points: impl Fn() -> I) -> 
 fn gradients(cloud: &Cleaned, rect: &Rect) -> Estimate {
     let horizontal = mean_difference(cloud, rect, (1, 0));
     let vertical = mean_difference(cloud, rect, (0, 1));
-    match horizontal.zip(vertical) {
-        Some((horizontal, vertical)) => normal_of_tangents(vertical, horizontal),
-        None => Estimate::NONE,
-    }
+    vertical.zip(horizontal).map_or(Estimate::NONE, |(v, h)| normal_of_tangents(v, h))
 }
 
 /// SDC (Eq. 9-15): tangents whose x and y are differences of the outermost points of the middle row or column, and
@@ -61,10 +59,7 @@ fn smoothed_depth_changes(cloud: &Cleaned, rect: &Rect) -> Estimate {
     let (column, row) = rect.middle();
     let horizontal = tangent(cloud, rect, &Rect { y: row..row + 1, ..rect.clone() }, (1, 0));
     let vertical = tangent(cloud, rect, &Rect { x: column..column + 1, ..rect.clone() }, (0, 1));
-    match horizontal.zip(vertical) {
-        Some((horizontal, vertical)) => normal_of_tangents(vertical, horizontal),
-        None => Estimate::NONE,
-    }
+    vertical.zip(horizontal).map_or(Estimate::NONE, |(v, h)| normal_of_tangents(v, h))
 }
 
 /// The tangent along a line of a rectangle: x and y from its outermost points, z from the mean difference across two pixels.
@@ -73,26 +68,24 @@ fn tangent(cloud: &Cleaned, rect: &Rect, line: &Rect, step: (usize, usize)) -> O
     let (from, to) = (there.next()?, there.last()?);
     let length = to.0 - from.0 + to.1 - from.1;
     let slope = mean_difference(cloud, rect, step)?[2] / 2.0;
-    let (from, to) = (cloud.at(from.0, from.1), cloud.at(to.0, to.1));
-    let difference = |i: usize| f64::from(to[i]) - f64::from(from[i]);
-    Some([difference(0), difference(1), slope * length as f64])
+    let [from, to] = [from, to].map(|(x, y)| cloud.at(x, y).map(f64::from));
+    let [x, y, _] = difference(to, from);
+    Some([x, y, slope * length as f64])
 }
 
 /// The mean of P(m + step) - P(m - step) over the pixels m inside the rectangle's outermost rows and columns, where
 /// both points are finite; none if there is no such pair.
 fn mean_difference(cloud: &Cleaned, rect: &Rect, (dx, dy): (usize, usize)) -> Option<[f64; 3]> {
-    let (mut sum, mut count) = ([0.0; 3], 0.0);
+    let (mut total, mut count) = ([0.0; 3], 0.0);
     for (x, y) in rect.inner().pixels() {
         let (ahead, behind) = (cloud.at(x + dx, y + dy), cloud.at(x - dx, y - dy));
         if ahead[2].is_nan() || behind[2].is_nan() {
             continue;
         }
-        for i in 0..3 {
-            sum[i] += f64::from(ahead[i]) - f64::from(behind[i]);
-        }
+        total = sum(total, difference(ahead.map(f64::from), behind.map(f64::from)));
         count += 1.0;
     }
-    (count > 0.0).then(|| sum.map(|sum| sum / count))
+    (count > 0.0).then(|| total.map(|total| total / count))
 }
 
 /// The pixels of a rectangle that have a point.
