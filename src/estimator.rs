@@ -150,7 +150,7 @@ impl Estimator {
         let width = points.width();
         let plain = Plain::new(points, &self.options)?;
         let estimate = |pixel: usize| plain.estimate(pixel % width, pixel / width);
-        write(normals, indices, width, &Workers::default(), |_, pixel| Some(estimate(pixel)));
+        write(normals, indices, &Workers::default(), |_, pixel| Some(estimate(pixel)));
         Ok(())
     }
 
@@ -188,7 +188,7 @@ impl Estimator {
         let cleaned = cleaned.as_ref().map(Cloud::view);
         let found = of_window(cleaned.as_ref().unwrap_or(points), &self.options, (x, y), size);
         let found = turn_to_viewpoint(found, points.at(x, y), self.options.viewpoint);
-        write(normal, None, 1, &Workers::default(), |_, _| Some(found));
+        write(normal, None, &Workers::default(), |_, _| Some(found));
         Ok(())
     }
 
@@ -270,7 +270,7 @@ impl Estimator {
         let workers = scratch.workers();
         let mut engine = PlainEngine { points, options, workers, sizes: Vec::new() };
         second_pass.compute(cloud, options, &mut engine)?;
-        write(normals, indices, cloud.width, workers, |_, at| {
+        write(normals, indices, workers, |_, at| {
             let chosen = second_pass.chosen(cloud, options, at, engine.sizes[at]);
             Some(chosen.unwrap_or_else(|| engine.own(at)))
         });
@@ -315,7 +315,7 @@ impl Estimator {
             fast::paper::write_chosen(&job, second_pass, cloud, normals, of_left, scratch);
             return Ok(());
         }
-        write(normals, indices, width, workers, |_, at| {
+        write(normals, indices, workers, |_, at| {
             let pixel = (at % width, at / width);
             let size = job.sizes(scratch, pixel.1)[pixel.0];
             let chosen = second_pass.chosen(cloud, options, at, size);
@@ -338,12 +338,11 @@ impl Estimator {
     }
 }
 
-/// Writes the estimates of the pixels that `indices` list, or of all pixels of an image of this width, for which there is
-/// one: `estimate` gives those of normals, by column and row, and of the pixels that they belong to.
+/// Writes the estimates of the pixels that `indices` list, or of all, for which there is one: `estimate` gives those of
+/// normals, by column and row, and of the pixels that they belong to.
 fn write(
     normals: &Normals,
     indices: Option<&[i32]>,
-    width: usize,
     workers: &Workers,
     estimate: impl Fn((usize, usize), usize) -> Option<Estimate> + Sync,
 ) {
@@ -355,7 +354,7 @@ fn write(
     };
     match indices {
         None => workers.for_each(normals.height(), |_, y| {
-            (0..width).for_each(|x| put(x, y, y * width + x));
+            (0..normals.width()).for_each(|x| put(x, y, y * normals.width() + x));
         }),
         Some(indices) => {
             indices.iter().enumerate().for_each(|(k, index)| put(k, 0, *index as usize));
@@ -373,7 +372,7 @@ fn write_around(
     workers: &Workers,
 ) {
     if options.one_sided_windows {
-        write(normals, indices, cloud.width, workers, |(x, y), at| {
+        write(normals, indices, workers, |(x, y), at| {
             // SAFETY: every normal has been written, and falls to one thread.
             let has_normal = || unsafe { normals.has_normal(x, y) };
             second_pass.estimate_around(cloud, options, at, has_normal)
