@@ -332,9 +332,7 @@ impl Estimator {
 
     /// Frees the scratch memory and the worker threads; the next computation makes them anew.
     pub fn release_scratch(&mut self) {
-        self.scratch = Scratch::default();
-        self.cloud = Cloud::default();
-        self.second_pass = SecondPass::default();
+        *self = Self::with_isa(self.options.clone(), self.isa);
     }
 }
 
