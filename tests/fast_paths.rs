@@ -11,7 +11,7 @@ use iine::{BorderPolicy, Depth, Estimator, Isa, Method, Normals, Options, Points
 
 const SMOOTHING: [f32; 6] = [3.0, 5.0, 7.0, 10.0, 20.0, 40.0];
 
-/// The largest differences seen.
+/// The largest differences seen; printed in the end.
 #[derive(Debug, Default)]
 struct Worst {
     angle: [f64; 4],
@@ -92,6 +92,12 @@ impl Worst {
     }
 }
 
+impl Drop for Worst {
+    fn drop(&mut self) {
+        println!("{self:?}");
+    }
+}
+
 #[test]
 fn all_sizes_equal_the_plain_form() {
     let mut worst = Worst::default();
@@ -117,7 +123,6 @@ fn all_sizes_equal_the_plain_form() {
             }
         }
     }
-    println!("{worst:?}");
 }
 
 #[test]
@@ -130,7 +135,6 @@ fn every_kind_equals_the_plain_form() {
         }
     }
     worst.check_every_kind(77, 53, &all);
-    println!("{worst:?}");
 }
 
 #[test]
@@ -154,7 +158,6 @@ fn the_papers_windows_equal_the_plain_form() {
     for options in paper_options().iter().step_by(5) {
         worst.check(&cloud, "several tiles", options);
     }
-    println!("{worst:?}");
 }
 
 /// Radii beyond the image.
@@ -172,7 +175,6 @@ fn the_papers_largest_windows_equal_the_plain_form() {
             worst.check(&cloud, &format!("{kind:?}"), &options);
         }
     }
-    println!("{worst:?}");
 }
 
 #[test]
@@ -206,7 +208,6 @@ fn windows_near_depth_changes_and_creases_equal_the_plain_form() {
             worst.check(&cloud, "relief", &options);
         }
     }
-    println!("{worst:?}");
 }
 
 /// Rows or columns of which only every third has points: the middle lines of windows have one point, or none.
@@ -231,7 +232,6 @@ fn sparse_lines_equal_the_plain_form() {
             }
         }
     }
-    println!("{worst:?}");
 }
 
 /// Several tiles and many groups a row.
@@ -247,7 +247,6 @@ fn wide_clouds_equal_the_plain_form() {
             }
         }
     }
-    println!("{worst:?}");
 }
 
 /// A wide-angle camera's, or turned to a robot's axes: from some row on coordinates are larger than any depth, so what
@@ -267,7 +266,6 @@ fn points_far_off_the_axis_equal_the_plain_form() {
             }
         }
     }
-    println!("{worst:?}");
 }
 
 /// A far plane for "no return", surfaces that go from near to far without a depth change, and points at the camera.
@@ -325,7 +323,6 @@ fn depths_orders_of_magnitude_apart_equal_the_plain_form() {
             assert_same_bits(&expected, &listed, listed.len(), &format!("indices, {what}"));
         }
     }
-    println!("{worst:?}");
 }
 
 /// Markers for "no return" here and there, which with so large a gamma are on the surfaces around them: a window's points
@@ -364,7 +361,6 @@ fn windows_with_far_markers_equal_the_plain_form() {
             worst.check(&cloud, &format!("seed {seed}"), &options);
         }
     }
-    println!("{worst:?}");
 }
 
 /// So far away that a point twenty times as far is no depth change: sums about that one would lose what its window's others
@@ -392,7 +388,6 @@ fn windows_with_one_far_point_equal_the_plain_form() {
             worst.check(&cloud, &format!("seed {seed}"), options);
         }
     }
-    println!("{worst:?}");
 }
 
 /// Seen from aside, points at the camera in front of others: those of a window are far apart along a line, which leaves more
@@ -416,7 +411,6 @@ fn points_at_the_camera_seen_from_aside_equal_the_plain_form() {
             worst.check(&cloud, &format!("seed {seed}"), &options);
         }
     }
-    println!("{worst:?}");
 }
 
 /// All but depth changes from each pixel to the next, up and down: what sums of integers that wrap around must still
@@ -453,7 +447,6 @@ fn the_steepest_surfaces_equal_the_plain_form() {
             }
         }
     }
-    println!("{worst:?}");
 }
 
 /// Coordinates at both ends of what sums of integers allow, and a window's side a power of two as they are.
@@ -476,7 +469,6 @@ fn points_on_opposite_sides_equal_the_plain_form() {
             worst.check(&cloud, "opposite", &options(method, 16.0, false));
         }
     }
-    println!("{worst:?}");
 }
 
 /// No depth change map tells whether the last point of all belongs to those next to it.
@@ -496,7 +488,6 @@ fn a_last_point_apart_equals_the_plain_form() {
             }
         }
     }
-    println!("{worst:?}");
 }
 
 /// Many equal depths, as of a sensor with depth steps, beside far ones: sums of integers round all of them alike.
@@ -526,7 +517,6 @@ fn depth_steps_equal_the_plain_form() {
             }
         }
     }
-    println!("{worst:?}");
 }
 
 /// Flat in front of the camera, with zeros for "no return": windows near these have no slope at all.
@@ -548,7 +538,6 @@ fn flat_depths_with_zeros_equal_the_plain_form() {
             worst.check(&cloud, &format!("flat, seed {seed}"), options);
         }
     }
-    println!("{worst:?}");
 }
 
 /// Blocks of one point, as a sensor may write it for "no return", and of points that lack a coordinate.
@@ -570,7 +559,6 @@ fn blocks_of_one_point_equal_the_plain_form() {
             worst.check(&cloud, &format!("seed {seed}"), &random_options(&mut random));
         }
     }
-    println!("{worst:?}");
 }
 
 /// Windows that go far beyond the border, or have all of the image; in millimetres, as the depths let each be.
@@ -590,7 +578,6 @@ fn windows_as_large_as_the_image_equal_the_plain_form() {
         let options = options(method, size, random.below(2) == 0);
         worst.check(&cloud, &format!("{kind:?} {width}x{height} seed {seed}"), &options);
     }
-    println!("{worst:?}");
 }
 
 /// Windows as large as the image cost no more than others: by walking over them this would take hours.
@@ -618,7 +605,6 @@ fn random_clouds_and_options_equal_the_plain_form() {
             worst.check(&cloud, &format!("seed {seed}"), &random_options(&mut random));
         }
     }
-    println!("{worst:?}");
 }
 
 const CANARY: f32 = -12345.5;
