@@ -287,14 +287,12 @@ fn depths_orders_of_magnitude_apart_equal_the_plain_form() {
         }
     }
     for (growth, sign) in [(1.03, 1.0), (1.036, -1.0)] {
-        let point = |at: usize| {
-            let (x, y) = (at % width, at / width);
+        let cloud = Cloud::of(width, height, |x, y| {
             let z = (1.4 * f32::powi(growth, (x + y) as i32) - 1.0) * sign;
-            let hole = at.is_multiple_of(97) && y > 20;
+            let hole = (y * width + x).is_multiple_of(97) && y > 20;
             [x as f32 / 100.0 * z, y as f32 / 100.0 * z, if hole { f32::NAN } else { z }]
-        };
-        let points = (0..width * height).map(point).collect();
-        clouds.push((format!("growing by {growth}"), Cloud { width, height, points }));
+        });
+        clouds.push((format!("growing by {growth}"), cloud));
     }
     for (seed, near) in (0..).zip([1e-3, -1e-20]) {
         let mut cloud = Cloud::new(Kind::Noisy, width, height, seed);
@@ -341,8 +339,7 @@ fn windows_with_far_markers_equal_the_plain_form() {
         let depth_only = random.below(2) == 0;
         let one_in = random.pick(&[1000, 200, 50, 10]);
         let noise = random.pick(&[0.0, 0.1]);
-        let point = |at: usize| {
-            let (x, y) = (at % width, at / width);
+        let cloud = Cloud::of(width, height, |x, y| {
             let [u, v] = [x, y].map(|at| at as f32 / 60.0 - 0.25);
             let z = 1.0 + slope[0] * u + slope[1] * v + noise * random.between(0.0, 1.0);
             let is_marked = is_in_block(x, y) || random.below(one_in) == 0;
@@ -351,9 +348,7 @@ fn windows_with_far_markers_equal_the_plain_form() {
                 (true, false) => [65504.0; 3],
                 (true, true) => [u * z, v * z, 65504.0],
             }
-        };
-        let points = (0..width * height).map(point).collect();
-        let cloud = Cloud { width, height, points };
+        });
         for mut options in edge_options() {
             options.paper.gamma = 140.0;
             options.paper.depth = random.pick(&Depth::ALL);
@@ -374,16 +369,14 @@ fn windows_with_one_far_point_equal_the_plain_form() {
     for seed in 0..6 {
         let mut random = Random::new(seed);
         let focal = random.between(1e4, 1e5);
-        let mut points = Vec::new();
-        for at in 0..width * height {
-            let [u, v] = [at % width, at / width].map(|at| at as f32 / focal);
+        let cloud = Cloud::of(width, height, |x, y| {
+            let [u, v] = [x, y].map(|at| at as f32 / focal);
             let mut z = 2000.0 * (1.0 + u + random.between(0.0, 1e-7));
             if random.below(1000) == 0 {
                 z *= 20.0;
             }
-            points.push([(u - 0.6) * z, (v + 0.8) * z, z]);
-        }
-        let cloud = Cloud { width, height, points };
+            [(u - 0.6) * z, (v + 0.8) * z, z]
+        });
         for options in &all_options {
             worst.check(&cloud, &format!("seed {seed}"), options);
         }
@@ -400,13 +393,11 @@ fn points_at_the_camera_seen_from_aside_equal_the_plain_form() {
         let mut random = Random::new(seed);
         let ray = [(); 2].map(|()| random.between(-6.0, 6.0));
         let focal = random.between(1e3, 1e5);
-        let point = |at: usize| {
-            let [u, v] = [at % width, at / width].map(|at| at as f32 / focal);
+        let cloud = Cloud::of(width, height, |x, y| {
+            let [u, v] = [x, y].map(|at| at as f32 / focal);
             let point = [ray[0] + u, ray[1] + v, 1.0].map(|c| 8.8 * c);
             if random.below(40) == 0 { point.map(|c| 1e-3 * c) } else { point }
-        };
-        let points = (0..width * height).map(point).collect();
-        let cloud = Cloud { width, height, points };
+        });
         for options in edge_options() {
             worst.check(&cloud, &format!("seed {seed}"), &options);
         }
@@ -428,13 +419,11 @@ fn the_steepest_surfaces_equal_the_plain_form() {
             depths.push(z + step);
         }
         for (across, along) in [(1.0, 0.0), (0.0, -1.0), (0.7, 0.7)] {
-            let point = |at: usize| {
-                let (x, y) = (at % width, at / width);
+            let cloud = Cloud::of(width, height, |x, y| {
                 let steps = if along < 0.0 { height - y } else { y } as f32;
                 let z = depths[(across * x as f32 + f32::abs(along) * steps) as usize];
                 [(x as f32 - 50.0) / 60.0 * z, (y as f32 - 45.0) / 60.0 * z, z]
-            };
-            let cloud = Cloud { width, height, points: (0..width * height).map(point).collect() };
+            });
             for (method, border_policy) in methods() {
                 if method != Method::AverageDepthChange {
                     continue;
@@ -455,16 +444,14 @@ fn points_on_opposite_sides_equal_the_plain_form() {
     let mut worst = Worst::default();
     let (width, height) = (80, 60);
     for (columns, rows) in [(40, 0), (0, 30)] {
-        let point = |at: usize| {
-            let (x, y) = (at % width, at / width);
+        let cloud = Cloud::of(width, height, |x, y| {
             let side = |at: usize, middle: usize, along: usize| match middle {
                 0 => (along as f32 - 40.0) / 40.0,
                 _ if at < middle => -2.0,
                 _ => 2.0,
             };
             [side(x, columns, x), side(y, rows, y), 2.0 - (x + y) as f32 / 512.0]
-        };
-        let cloud = Cloud { width, height, points: (0..width * height).map(point).collect() };
+        });
         for method in methods() {
             worst.check(&cloud, "opposite", &options(method, 16.0, false));
         }
@@ -499,14 +486,12 @@ fn depth_steps_equal_the_plain_form() {
         // Steps that no integers are multiples of.
         let step = 0.003 * (1.0 + seed as f32 / 7.0);
         let far = [8.0, 20.0, 40.0][seed % 3];
-        let point = |at: usize| {
-            let (x, y) = (at % width, at / width);
+        let cloud = Cloud::of(width, height, |x, y| {
             let [u, v] = [(x as f32 - 48.0) / 525.0, (y as f32 - 35.0) / 525.0];
             let z = if x > 80 { far } else { 1.0 + 0.7 * u - 0.3 * v };
             let z = step * (z / step).round();
             [u * z, v * z, z]
-        };
-        let cloud = Cloud { width, height, points: (0..width * height).map(point).collect() };
+        });
         for method in methods() {
             for smoothing in SMOOTHING {
                 worst.check(
@@ -527,13 +512,11 @@ fn flat_depths_with_zeros_equal_the_plain_form() {
     for seed in 0..6 {
         let mut random = Random::new(seed as u64);
         let step = [0.1, 0.3][seed % 2];
-        let point = |at: usize| {
-            let (x, y) = (at % width, at / width);
+        let cloud = Cloud::of(width, height, |x, y| {
             let [u, v] = [(x as f32 - 48.0) / 400.0, (y as f32 - 35.0) / 400.0];
             let z = step * ((2.0 + (0.5 + seed as f32) * u + 0.5 * v) / step).round();
             if random.below(20) == 0 { [0.0; 3] } else { [u * z, v * z, z] }
-        };
-        let cloud = Cloud { width, height, points: (0..width * height).map(point).collect() };
+        });
         for options in &edge_options() {
             worst.check(&cloud, &format!("flat, seed {seed}"), options);
         }
@@ -804,9 +787,7 @@ fn normals_and_curvatures_may_be_planes() {
 #[test]
 fn edge_on_normals_are_not_turned() {
     let (width, height) = (40, 30);
-    let point = |i: usize| [(i % width) as f32 * 0.25, (i / width) as f32 * 0.25, 1.0];
-    let points = (0..width * height).map(point).collect();
-    let cloud = Cloud { width, height, points };
+    let cloud = Cloud::of(width, height, |x, y| [x as f32 * 0.25, y as f32 * 0.25, 1.0]);
     for (method, z) in [
         (Method::Average3DGradient, -1.0),
         (Method::Simple3DGradient, -1.0),
@@ -825,10 +806,7 @@ fn edge_on_normals_are_not_turned() {
 /// Windows of one point, and beside them, in the same lanes, windows whose points lie on a line: both are left to the end.
 #[test]
 fn windows_of_one_point_are_told_from_their_neighbours() {
-    let (width, height) = (90, 40);
-    let point = |i: usize| [0.3 + 0.01 * (i % width).saturating_sub(44) as f32, 0.2, 1.0];
-    let points = (0..width * height).map(point).collect();
-    let cloud = Cloud { width, height, points };
+    let cloud = Cloud::of(90, 40, |x, _| [0.3 + 0.01 * x.saturating_sub(44) as f32, 0.2, 1.0]);
     let mut worst = Worst::default();
     for method in methods() {
         worst.check(&cloud, "a point and a line", &options(method, 6.0, false));

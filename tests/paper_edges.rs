@@ -268,12 +268,10 @@ fn the_second_pass_sees_steps_finer_than_windows() {
         let bottom = (floor - rise) / first;
         let slope = |y: usize| bottom - (height - y) as f64 / focal;
         let of_rows: Vec<_> = (0..height).map(|y| hit(slope(y), first)).collect();
-        let point = |at: usize| {
-            let (x, y) = (at % width, at / width);
+        let Cloud { points, .. } = Cloud::of(width, height, |x, y| {
             let z = of_rows[y].0;
             [(x as f64 - 60.0) / focal * z, slope(y) * z, z].map(|c| c as f32)
-        };
-        let points: Vec<_> = (0..width * height).map(point).collect();
+        });
         for method in [Method::CovarianceMatrix, Method::Average3DGradient] {
             let normals = normals(&points, width, options(method, true, true));
             let angle = |(at, normal): (usize, &[f32; 3])| {
@@ -410,14 +408,11 @@ fn narrow_surfaces_are_apart_from_what_is_behind() {
             (1..9).flat_map(|narrow| [0, 8, 9, 10, 11].map(|first| (narrow, first)))
         {
             for axis in [0, 1] {
-                let point = |at: usize| {
-                    let pixel = [at % width, at / width];
-                    let is_narrow = (first..first + narrow).contains(&pixel[axis]);
+                let Cloud { points, .. } = Cloud::of(width, height, |x, y| {
+                    let is_narrow = (first..first + narrow).contains(&[x, y][axis]);
                     let z = if is_narrow { near } else { far };
-                    let [x, y] = [pixel[0] as f32 - 19.7, pixel[1] as f32 - 14.7];
-                    [x / 60.0 * z, y / 60.0 * z, z]
-                };
-                let points: Vec<_> = (0..width * height).map(point).collect();
+                    [(x as f32 - 19.7) / 60.0 * z, (y as f32 - 14.7) / 60.0 * z, z]
+                });
                 for (semantics, smoothing) in
                     [(Semantics::Pcl, 10.0), (Semantics::Pcl, 40.0), (Semantics::Paper, 10.0)]
                 {
@@ -454,13 +449,12 @@ fn points_in_line_have_no_normal() {
     let (width, height) = (40, 30);
     for noise in [0.0, 0.002] {
         for line in [|x: usize, _: usize| x == 17, |_, y| y == 12, |x, y| x == y + 3] {
-            let point = |at: usize| {
-                let (x, y) = (at % width, at / width);
+            let Cloud { points, .. } = Cloud::of(width, height, |x, y| {
+                let at = y * width + x;
                 let z = 1.3 + 0.001 * (x + 2 * y) as f32 + noise * (at * 7919 % 101) as f32 / 101.0;
                 let [px, py] = [x as f32 - 19.7, y as f32 - 14.7].map(|way| way / 525.0 * z);
                 if line(x, y) { [px, py, z] } else { [f32::NAN; 3] }
-            };
-            let points: Vec<_> = (0..width * height).map(point).collect();
+            });
             for semantics in Semantics::ALL {
                 for one_sided in [false, true] {
                     for method in [
@@ -483,12 +477,10 @@ fn points_in_line_have_no_normal() {
 /// Where no difference of depth is allowed at all, points of one plane are none apart.
 #[test]
 fn points_in_a_plane_lie_in_its_windows() {
-    let (width, height) = (37, 30);
-    let point = |at: usize| {
-        let [x, y] = [at % width, at / width].map(|place| place as f32 / 60.0 * 1.7);
+    let cloud = Cloud::of(37, 30, |x, y| {
+        let [x, y] = [x, y].map(|place| place as f32 / 60.0 * 1.7);
         [x - 0.5, y - 0.4, 1.7]
-    };
-    let cloud = Cloud { width, height, points: (0..width * height).map(point).collect() };
+    });
     for isa in fast_isas().chain([Isa::Scalar]) {
         let mut options = options(Method::AverageDepthChange, false, true);
         options.semantics = Semantics::Pcl;
@@ -505,15 +497,12 @@ fn points_in_a_plane_lie_in_its_windows() {
 /// Steps so fine that windows' planes are far from the points: no eigenvalue's share, but in its range.
 #[test]
 fn curvatures_are_in_their_range() {
-    let (width, height) = (42, 30);
     let steps = [(0.05, 4, 500.0, 5.0), (0.5, 1, 500.0, 200.0), (3.0, 4, 60.0, 200.0)];
     for (step, side, focal, gamma) in steps {
-        let point = |at: usize| {
-            let (x, y) = (at % width, at / width);
+        let cloud = Cloud::of(42, 30, |x, y| {
             let z = 1.0 + if (x / side + y / side) % 2 == 0 { 0.0 } else { step };
             [(x as f32 - 20.0) / focal * z, (y as f32 - 15.0) / focal * z, z]
-        };
-        let cloud = Cloud { width, height, points: (0..width * height).map(point).collect() };
+        });
         for semantics in Semantics::ALL {
             for one_sided in [false, true] {
                 for isa in fast_isas().chain([Isa::Scalar]) {

@@ -493,8 +493,8 @@ fn clouds_without_surfaces_match_the_equations() {
             differences.add(&cloud, &options, 1);
         }
         // A line in space.
-        let points = (0..31 * 23).map(|at| [0.25 * (at % 31) as f32, 0.0, 1.0]).collect();
-        differences.add(&Cloud { width: 31, height: 23, points }, &options, 1);
+        let line = Cloud::of(31, 23, |x, _| [0.25 * x as f32, 0.0, 1.0]);
+        differences.add(&line, &options, 1);
         // A ninth of the coordinates, so of nearly a third of the points, is anything.
         let mut cloud = Cloud::new(Kind::Noisy, 64, 48, 3);
         let mut random = Random::new(11);

@@ -90,6 +90,16 @@ pub struct Cloud {
 }
 
 impl Cloud {
+    /// A cloud of the points that `point` gives for each column and row, asked row by row.
+    pub fn of(
+        width: usize,
+        height: usize,
+        mut point: impl FnMut(usize, usize) -> [f32; 3],
+    ) -> Cloud {
+        let points = (0..width * height).map(|at| point(at % width, at / width)).collect();
+        Cloud { width, height, points }
+    }
+
     pub fn view(&self) -> Points<'_> {
         Points::interleaved(self.points.as_flattened(), self.width, self.height, 3, 0).unwrap()
     }
@@ -104,25 +114,21 @@ impl Cloud {
         let [a, b] = [random.between(-slope, slope), random.between(-slope, slope)];
         let wave = random.between(0.005, 0.02);
         let is_plane = matches!(kind, Kind::Plane | Kind::SteepPlane);
-        let mut points = Vec::with_capacity(width * height);
-        for row in 0..height {
-            for column in 0..width {
-                let u = (column as f32 - width as f32 / 2.0) / 525.0;
-                let v = (row as f32 - height as f32 / 2.0) / 525.0;
-                let mut z = 1.2 / (1.0 - a * u - b * v);
-                if !is_plane {
-                    z += wave * (0.21 * column as f32).sin() * (0.17 * row as f32 + 0.5).cos();
-                }
-                if kind == Kind::Noisy {
-                    z += random.between(-0.003, 0.003);
-                }
-                if kind == Kind::Steps {
-                    z += 0.4 * ((column / 11 + row / 17) % 3) as f32;
-                }
-                points.push([u * z, v * z, z]);
+        let mut cloud = Cloud::of(width, height, |column, row| {
+            let u = (column as f32 - width as f32 / 2.0) / 525.0;
+            let v = (row as f32 - height as f32 / 2.0) / 525.0;
+            let mut z = 1.2 / (1.0 - a * u - b * v);
+            if !is_plane {
+                z += wave * (0.21 * column as f32).sin() * (0.17 * row as f32 + 0.5).cos();
             }
-        }
-        let mut cloud = Cloud { width, height, points };
+            if kind == Kind::Noisy {
+                z += random.between(-0.003, 0.003);
+            }
+            if kind == Kind::Steps {
+                z += 0.4 * ((column / 11 + row / 17) % 3) as f32;
+            }
+            [u * z, v * z, z]
+        });
         cloud.change(kind, &mut random);
         cloud
     }
@@ -146,10 +152,9 @@ impl Cloud {
         let change = random.pick(&ODD);
         let scale = or_none(random, -7.0, 7.0).exp();
         let offset = [(); 3].map(|()| or_none(random, -50.0, 50.0));
-        let mut points = Vec::with_capacity(width * height);
-        for at in 0..width * height {
-            let u = ((at % width) as f32 - width as f32 / 2.0) / focal;
-            let v = ((at / width) as f32 - height as f32 / 2.0) / focal;
+        let mut cloud = Cloud::of(width, height, |column, row| {
+            let u = (column as f32 - width as f32 / 2.0) / focal;
+            let v = (row as f32 - height as f32 / 2.0) / focal;
             let mut z =
                 1.0 + slope[0] * u + slope[1] * v + wave * (20.0 * u).sin() * (30.0 * v).cos();
             z += if u + 2.0 * v > 0.1 { step } else { 0.0 };
@@ -169,13 +174,13 @@ impl Cloud {
             } else if random.between(0.0, 1.0) < odd {
                 point = change(point);
             }
-            points.push(point);
-        }
+            point
+        });
         if random.below(4) == 0 {
-            let last = points.len() - 1;
-            points[last] = random.pick(&ODD)(points[last]);
+            let last = cloud.points.last_mut().expect("points");
+            *last = random.pick(&ODD)(*last);
         }
-        Cloud { width, height, points }
+        cloud
     }
 
     fn change(&mut self, kind: Kind, random: &mut Random) {
