@@ -41,6 +41,18 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
+/// So many threads give what one gives.
+fn check_threads(cloud: &Cloud, mut options: Options, numbers: &[usize]) {
+    options.threads = 1;
+    let one = compute(&mut Estimator::new(options.clone()), cloud);
+    for threads in numbers {
+        options.threads = *threads;
+        let found = compute(&mut Estimator::new(options.clone()), cloud);
+        let what = format!("{}x{} {options:?}", cloud.width, cloud.height);
+        assert_same_bits(&found, &one, cloud.width, &what);
+    }
+}
+
 #[test]
 fn the_number_of_threads_does_not_matter() {
     for (kind, width, height) in [
@@ -57,16 +69,7 @@ fn the_number_of_threads_does_not_matter() {
                 all.extend([5.0, 10.0, 20.0].map(|size| options(method, size, depth_dependent)));
             }
         }
-        for mut options in all {
-            options.threads = 1;
-            let one = compute(&mut Estimator::new(options.clone()), &cloud);
-            for threads in [2, 3, 7] {
-                options.threads = threads;
-                let found = compute(&mut Estimator::new(options.clone()), &cloud);
-                let what = format!("{kind:?} {options:?}");
-                assert_same_bits(&found, &one, width, &what);
-            }
-        }
+        all.into_iter().for_each(|options| check_threads(&cloud, options, &[2, 3, 7]));
     }
 }
 
@@ -86,15 +89,9 @@ fn where_depth_changes_are_far_away_the_number_of_threads_does_not_matter_either
     }
     let mut all = paper_options();
     all.extend(edge_options());
-    for mut options in all {
+    for options in all {
         for cloud in [&cloud, &with_gap] {
-            options.threads = 1;
-            let one = compute(&mut Estimator::new(options.clone()), cloud);
-            for threads in [2, 3] {
-                options.threads = threads;
-                let found = compute(&mut Estimator::new(options.clone()), cloud);
-                assert_same_bits(&found, &one, width, &format!("{options:?}"));
-            }
+            check_threads(cloud, options.clone(), &[2, 3]);
         }
     }
 }
@@ -125,13 +122,7 @@ fn what_differs_from_strip_to_strip_does_not_depend_on_the_number_of_threads() {
     }
     for method in methods() {
         for size in [5.0, 20.0, 120.0] {
-            let mut options = options(method, size, true);
-            let one = compute(&mut Estimator::new(options.clone()), &cloud);
-            for threads in [2, 4, 16] {
-                options.threads = threads;
-                let found = compute(&mut Estimator::new(options.clone()), &cloud);
-                assert_same_bits(&found, &one, width, &format!("{options:?}"));
-            }
+            check_threads(&cloud, options(method, size, true), &[2, 4, 16]);
         }
     }
 }
