@@ -323,6 +323,25 @@ fn depths_orders_of_magnitude_apart_equal_the_plain_form() {
     }
 }
 
+/// Zeros, or a driver's largest float: also where they take more room than a window.
+#[test]
+fn points_for_no_return_equal_the_plain_form() {
+    let mut worst = Worst::default();
+    let (width, height) = (120, 90);
+    for depth in [0.0, 100.0, 1e15, f32::MAX] {
+        for (seed, (across, down)) in [(1, 1), (37, 23), (width, 31)].into_iter().enumerate() {
+            for (x, y) in [(30, 20), (70, 59)] {
+                let mut cloud = Cloud::new(Kind::Wavy, width, height, seed as u64);
+                cloud.fill(x..x + across, y..y + down, [0.0, 0.0, depth]);
+                for method in methods() {
+                    let what = format!("{across}x{down} at {depth}");
+                    worst.check(&cloud, &what, &options(method, 8.0, false));
+                }
+            }
+        }
+    }
+}
+
 /// Markers for "no return" here and there, which with so large a gamma are on the surfaces around them: a window's points
 /// are then far apart along the line of sight.
 #[test]
