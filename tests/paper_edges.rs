@@ -6,8 +6,7 @@ mod clouds;
 use clouds::{Cloud, angle, compute, fast_isas};
 use iine::{BorderPolicy, Depth, Estimator, Isa, Method, Normals, Options, Points, Semantics};
 use iine_scenes::{
-    Band, Camera, Distances, Frame, Noise, Pcd, REAL_FRAMES, Random, Scene, Shape, real_frame,
-    scene,
+    Band, Camera, Frame, Noise, Pcd, REAL_FRAMES, Random, Scene, Shape, real_frame, scene,
 };
 use nalgebra::{Matrix3, Vector3};
 
@@ -75,11 +74,11 @@ fn score(frame: &Frame, normals: &[[f32; 3]], counts: impl Fn(usize) -> bool) ->
     Score { mean: sum / found, coverage: found / points }
 }
 
-/// A scene's frame with a noise, and how far its edges are.
-fn frame(name: &str, from: [f64; 2], noise: Noise) -> (Frame, Distances) {
+/// A scene's frame with a noise, and the bands of its pixels.
+fn frame(name: &str, from: [f64; 2], noise: Noise) -> (Frame, Vec<Band>) {
     let exact = scene(name).expect("a known scene").render(&camera(from));
-    let distances = Distances::of(&exact);
-    (noise.apply(&exact, &mut Random::new(1)), distances)
+    let bands = Band::map(&exact);
+    (noise.apply(&exact, &mut Random::new(1)), bands)
 }
 
 #[test]
@@ -93,11 +92,11 @@ fn near_depth_edges_errors_are_at_most_twice_those_elsewhere() {
     ];
     for (name, x) in scenes {
         for noise in [Noise::Nguyen, Noise::Khoshelham] {
-            let (frame, distances) = frame(name, [x, 120.0], noise);
+            let (frame, bands) = frame(name, [x, 120.0], noise);
             let options = options(Method::CovarianceMatrix, true, false);
             let normals = normals(&frame.points, frame.width(), options);
             let [edge, elsewhere] = [Band::DepthEdge, Band::Elsewhere]
-                .map(|band| score(&frame, &normals, |at| distances.band(at) == band));
+                .map(|band| score(&frame, &normals, |at| bands[at] == band));
             println!("{name} {noise:?}: {:.2} of {:.2} deg", edge.mean, elsewhere.mean);
             assert!(edge.coverage >= 0.99, "{name} {noise:?}: {}", edge.coverage);
             assert!(
@@ -124,11 +123,11 @@ const CREASED: [(&str, f64); 7] = [
 /// Checks that with crease windows the error in a band is so many times smaller than without, and that no normal is lost.
 fn check_creased(noise: Noise, band: Band, times: f64) {
     for (name, y) in CREASED {
-        let (frame, distances) = frame(name, [160.0, y], noise);
+        let (frame, bands) = frame(name, [160.0, y], noise);
         let [single, second] = [false, true].map(|creases| {
             let options = options(Method::CovarianceMatrix, false, creases);
             let normals = normals(&frame.points, frame.width(), options);
-            score(&frame, &normals, |at| distances.band(at) == band)
+            score(&frame, &normals, |at| bands[at] == band)
         });
         let what = format!("{name} {noise:?} {band:?}: {:.2} of {:.2}", second.mean, single.mean);
         println!("{what} deg");
@@ -318,11 +317,11 @@ fn the_second_pass_sees_folds_finer_than_windows() {
 fn the_second_pass_leaves_smooth_surfaces_as_they_are() {
     for name in ["plane", "sphere", "cylinder"] {
         for noise in [Noise::None, Noise::Nguyen] {
-            let (frame, distances) = frame(name, [320.0, 120.0], noise);
+            let (frame, bands) = frame(name, [320.0, 120.0], noise);
             let [single, second] = [false, true].map(|creases| {
                 let options = options(Method::CovarianceMatrix, true, creases);
                 let normals = normals(&frame.points, frame.width(), options);
-                score(&frame, &normals, |at| distances.band(at) == Band::Elsewhere).mean
+                score(&frame, &normals, |at| bands[at] == Band::Elsewhere).mean
             });
             println!("{name} {noise:?}: {second:.3} of {single:.3} deg");
             assert!(second <= 1.05 * single, "{name} {noise:?}: {second} of {single}");
@@ -379,15 +378,14 @@ fn the_second_pass_leaves_round_objects_as_they_are() {
 #[test]
 fn exact_depths_have_exact_normals_up_to_the_edges() {
     for (name, y) in [("box", 160.0), ("room", 120.0)] {
-        let (frame, distances) = frame(name, [160.0, y], Noise::None);
+        let (frame, bands) = frame(name, [160.0, y], Noise::None);
         for method in [Method::CovarianceMatrix, Method::Average3DGradient] {
             for side in [3, 5] {
                 let options = options_of_exact(method, side / 2, true);
                 let normals = normals(&frame.points, frame.width(), options);
                 let bounds = [(Band::Crease, 0.2), (Band::DepthEdge, 0.3), (Band::Elsewhere, 0.01)];
                 for (band, bound) in bounds {
-                    let Score { mean, coverage } =
-                        score(&frame, &normals, |at| distances.band(at) == band);
+                    let Score { mean, coverage } = score(&frame, &normals, |at| bands[at] == band);
                     println!("{name} {method:?} {side} {band:?}: {mean:.4} deg, {coverage}");
                     assert!(coverage == 1.0, "{name} {method:?} {side} {band:?}: {coverage}");
                     assert!(mean <= bound, "{name} {method:?} {side} {band:?}: {mean}");
@@ -523,14 +521,14 @@ fn curvatures_are_in_their_range() {
 /// all methods but SDC.
 #[test]
 fn steep_surfaces_are_no_edges() {
-    let (frame, distances) = frame("sphere", [320.0, 120.0], Noise::None);
+    let (frame, bands) = frame("sphere", [320.0, 120.0], Noise::None);
     for (method, bound) in [
         (Method::CovarianceMatrix, 2.0),
         (Method::Average3DGradient, 2.0),
         (Method::AverageDepthChange, 4.6),
     ] {
         let normals = normals(&frame.points, frame.width(), options(method, true, false));
-        let edge = score(&frame, &normals, |at| distances.band(at) == Band::DepthEdge);
+        let edge = score(&frame, &normals, |at| bands[at] == Band::DepthEdge);
         println!("{method:?}: {:.2} deg", edge.mean);
         assert!(edge.mean < bound, "{method:?}: {}", edge.mean);
     }

@@ -1,6 +1,6 @@
 //! Angles to the true normals, by band, with coverage.
 
-use iine_scenes::{Distances, Frame};
+use iine_scenes::{Band, Frame};
 
 /// What an estimate is worth in a part of the image.
 #[derive(Clone, Debug, Default)]
@@ -61,17 +61,17 @@ pub fn is_normal(normal: [f32; 3]) -> bool {
     normal.iter().all(|c| c.is_finite()) && normal != [0.0; 3]
 }
 
-/// The scores of normals at some pixels in the bands of [`iine_scenes::Band::ALL`].
+/// The scores of normals at some pixels in the bands of [`Band::ALL`].
 pub fn by_band(
     frame: &Frame,
-    distances: &Distances,
+    bands: &[Band],
     normals: &[[f32; 3]],
     pixels: impl Iterator<Item = usize>,
 ) -> [Score; 3] {
     let mut scores = [(); 3].map(|()| Score::default());
     for at in pixels.filter(|at| !frame.points[*at][2].is_nan()) {
         let normal = normals[at];
-        let score = &mut scores[distances.band(at) as usize];
+        let score = &mut scores[bands[at] as usize];
         score.points += 1;
         if is_normal(normal) {
             score.angles.push(angle(normal, frame.normals[at]));

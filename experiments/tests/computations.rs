@@ -4,7 +4,7 @@ use iine_experiments::errors::{Score, angle, by_band, towards_camera};
 use iine_experiments::plot::{Axis, Panel, Scale, svg};
 use iine_experiments::table::Row;
 use iine_experiments::{exchange, figures, parallel, ranking};
-use iine_scenes::{Band, Camera, Distances, scene};
+use iine_scenes::{Band, Camera, scene};
 
 const NAN: f32 = f32::NAN;
 
@@ -37,30 +37,29 @@ fn scores_are_signed_folded_and_middle_angles() {
 #[test]
 fn every_pixel_with_a_point_counts_in_its_band() {
     let frame = scene("box").expect("a known name").render(&Camera::with_size(160, 120));
-    let distances = Distances::of(&frame);
+    let bands = Band::map(&frame);
     let pixels = 160 * 120;
     let in_band = |band: Band| {
         let points = (0..pixels).filter(|at| !frame.points[*at][2].is_nan());
-        points.filter(|at| distances.band(*at) == band).count()
+        points.filter(|at| bands[*at] == band).count()
     };
     let mut normals = frame.normals.clone();
-    let exact = by_band(&frame, &distances, &normals, 0..pixels);
+    let exact = by_band(&frame, &bands, &normals, 0..pixels);
     for (score, band) in exact.iter().zip(Band::ALL) {
         assert!(in_band(band) > 100, "{band:?}");
         assert_eq!((score.points, score.angles.len()), (in_band(band), in_band(band)));
         assert!(score.mean() < 1e-3);
     }
     // One pixel that is not estimated, in each of the ways that estimators say so, and one with half a normal.
-    let elsewhere: Vec<usize> =
-        (0..pixels).filter(|at| distances.band(*at) == Band::Elsewhere).collect();
+    let elsewhere: Vec<usize> = (0..pixels).filter(|at| bands[*at] == Band::Elsewhere).collect();
     let none = [[NAN; 3], [0.0; 3], [f32::INFINITY; 3], [0.0, 0.0, NAN]];
     for (normal, at) in none.into_iter().zip(&elsewhere) {
         normals[*at] = normal;
     }
-    let [edges, creases, rest] = by_band(&frame, &distances, &normals, 0..pixels);
+    let [edges, creases, rest] = by_band(&frame, &bands, &normals, 0..pixels);
     assert_eq!((edges.coverage(), creases.coverage()), (1.0, 1.0));
     assert_eq!(rest.angles.len() + none.len(), rest.points);
-    assert_eq!(by_band(&frame, &distances, &normals, std::iter::once(elsewhere[9]))[2].points, 1);
+    assert_eq!(by_band(&frame, &bands, &normals, std::iter::once(elsewhere[9]))[2].points, 1);
 }
 
 /// A row with these numbers.

@@ -1,4 +1,4 @@
-//! Where in the image an estimate is hard: how far the nearest depth edge and the nearest crease are.
+//! Where in the image an estimate is hard: near depth edges and creases.
 
 use crate::render::{Frame, NO_SURFACE};
 use crate::vector::{Vector, dot};
@@ -6,9 +6,10 @@ use crate::vector::{Vector, dot};
 /// A part of the image, by what is near.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Band {
-    /// Within 8 px of a depth edge.
+    /// Within 8 px of a depth edge: of a pixel next to another surface with a gap between them, or to nothing.
     DepthEdge,
-    /// Within 10 px of a crease, and not in the band of a depth edge.
+    /// Within 10 px of a crease, and not in the band of a depth edge: of a pixel next to another surface without a gap, at
+    /// an angle above 10 degrees.
     Crease,
     /// All the rest.
     Elsewhere,
@@ -17,23 +18,9 @@ pub enum Band {
 impl Band {
     /// All bands.
     pub const ALL: [Band; 3] = [Band::DepthEdge, Band::Crease, Band::Elsewhere];
-}
 
-/// Distances in pixels, row by row, up to [`Distances::REACH`]; infinite beyond.
-#[derive(Clone, Debug)]
-pub struct Distances {
-    /// To the nearest pixel at a depth edge: next to another surface with a gap between them, or to nothing.
-    pub depth_edge: Vec<f32>,
-    /// To the nearest pixel at a crease: next to another surface without a gap, at an angle above 10 degrees.
-    pub crease: Vec<f32>,
-}
-
-impl Distances {
-    /// The farthest distance that is told apart.
-    pub const REACH: usize = 24;
-
-    /// The distances of an exact frame (of a noisy one, its edges are noisy too).
-    pub fn of(exact: &Frame) -> Self {
+    /// The bands of an exact frame's pixels, row by row (of a noisy one, its edges are noisy too).
+    pub fn map(exact: &Frame) -> Vec<Band> {
         let (width, height) = (exact.width(), exact.height());
         let (mut gaps, mut creases) = (Vec::new(), Vec::new());
         for y in 0..height {
@@ -50,21 +37,19 @@ impl Distances {
                 }
             }
         }
-        Distances {
-            depth_edge: spread(&gaps, width, height),
-            crease: spread(&creases, width, height),
+        let mut map = vec![Band::Elsewhere; width * height];
+        for (band, pixels, reach) in [(Band::Crease, creases, 10), (Band::DepthEdge, gaps, 8)] {
+            for (x, y) in pixels {
+                for ny in y.saturating_sub(reach)..(y + reach + 1).min(height) {
+                    for nx in x.saturating_sub(reach)..(x + reach + 1).min(width) {
+                        if x.abs_diff(nx).pow(2) + y.abs_diff(ny).pow(2) <= reach.pow(2) {
+                            map[ny * width + nx] = band;
+                        }
+                    }
+                }
+            }
         }
-    }
-
-    /// The band of pixel number `at`.
-    pub fn band(&self, at: usize) -> Band {
-        if self.depth_edge[at] <= 8.0 {
-            Band::DepthEdge
-        } else if self.crease[at] <= 10.0 {
-            Band::Crease
-        } else {
-            Band::Elsewhere
-        }
+        map
     }
 }
 
@@ -91,20 +76,4 @@ fn border(frame: &Frame, a: (usize, usize), b: (usize, usize)) -> Option<Band> {
     }
     let cosine = dot(double(frame.normals[i]), double(frame.normals[j]));
     (cosine < 10f64.to_radians().cos()).then_some(Band::Crease)
-}
-
-/// The distance map of the pixels listed.
-fn spread(pixels: &[(usize, usize)], width: usize, height: usize) -> Vec<f32> {
-    let mut map = vec![f32::INFINITY; width * height];
-    const REACH: usize = Distances::REACH;
-    for &(x, y) in pixels {
-        for ny in y.saturating_sub(REACH)..(y + REACH + 1).min(height) {
-            for nx in x.saturating_sub(REACH)..(x + REACH + 1).min(width) {
-                let distance = (nx as f32 - x as f32).hypot(ny as f32 - y as f32);
-                let to = &mut map[ny * width + nx];
-                *to = to.min(distance);
-            }
-        }
-    }
-    map
 }

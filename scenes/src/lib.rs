@@ -21,7 +21,7 @@ mod shapes;
 mod stage;
 mod vector;
 
-pub use bands::{Band, Distances};
+pub use bands::Band;
 pub use noise::{Noise, drop_out};
 pub use pcd::{Pcd, PcdError};
 pub use random::Random;

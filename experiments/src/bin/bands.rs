@@ -6,7 +6,7 @@
 use iine_experiments::errors::by_band;
 use iine_experiments::modes::Mode;
 use iine_experiments::parallel;
-use iine_scenes::{Camera, Distances, Noise, Random, SCENES, scene};
+use iine_scenes::{Band, Camera, Noise, Random, SCENES, scene};
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -25,7 +25,7 @@ fn main() {
     let jobs = scenes.iter().flat_map(|scene| noises.iter().map(move |noise| (scene, noise)));
     let texts = parallel::map(jobs.collect(), |(name, noise_name)| {
         let exact = scene(name).expect("a known scene").render(&Camera::default());
-        let distances = Distances::of(&exact);
+        let bands = Band::map(&exact);
         let noise = Noise::by_name(noise_name).expect("a known noise");
         let frame = noise.apply(&exact, &mut Random::new(1));
         let mut text = String::new();
@@ -35,7 +35,7 @@ fn main() {
         });
         for (who, normals) in found.chain([("truth", exact.normals.clone())]) {
             text += &format!("{name:10} {noise_name:10} {who:12}");
-            for score in by_band(&frame, &distances, &normals, 0..normals.len()) {
+            for score in by_band(&frame, &bands, &normals, 0..normals.len()) {
                 text += &format!(
                     " | {:6.2} {:6.2} {:6.2}%",
                     score.mean(),

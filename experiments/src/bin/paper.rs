@@ -17,7 +17,7 @@ use iine_experiments::modes::Mode;
 use iine_experiments::ranking::OURS;
 use iine_experiments::table::{self, Row};
 use iine_experiments::{exchange, figures, parallel, picture};
-use iine_scenes::{Camera, Distances, Frame, Noise, Pcd, Random, scene};
+use iine_scenes::{Band, Camera, Frame, Noise, Pcd, Random, scene};
 
 /// Depth edges, creases, planes and curved things, as the paper's rendered mesh has.
 const SCENE: &str = "tabletop";
@@ -82,11 +82,11 @@ fn fixed(semantics: Semantics, method: Method, side: u32, sigma: f64) -> Mode {
 fn errors(sigma: &str, size: &str, step: &str, cloud: &str, sides: &[&str]) -> Result<(), String> {
     let (exact, noisy) = frames(sigma, size)?;
     let (width, step) = (noisy.width(), number::<usize>(step)?);
-    let distances = Distances::of(&exact);
+    let bands = Band::map(&exact);
     let score = |normals: &[[f32; 3]]| -> [Score; 3] {
         let pixels = 0..normals.len();
         let pixels = pixels.filter(|at| at % width % step == 0 && at / width % step == 0);
-        by_band(&noisy, &distances, normals, pixels)
+        by_band(&noisy, &bands, normals, pixels)
     };
     let mut modes = Vec::new();
     for method in PAPER {

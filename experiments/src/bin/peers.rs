@@ -15,7 +15,7 @@ use iine_experiments::modes::Mode;
 use iine_experiments::ranking::OURS;
 use iine_experiments::table::Row;
 use iine_experiments::{exchange, parallel, ranking, table};
-use iine_scenes::{Camera, Distances, Frame, Noise, Random, SCENES, scene};
+use iine_scenes::{Band, Camera, Frame, Noise, Random, SCENES, scene};
 
 const NOISES: [&str; 4] = ["none", "nguyen", "khoshelham", "matched"];
 
@@ -73,9 +73,9 @@ fn clouds(name: &str, folder: &Path) -> Result<(), String> {
 
 fn scores(name: &str, folder: &Path, peer: Option<&str>) -> Result<(), String> {
     let (exact, frames) = frames(name)?;
-    let distances = Distances::of(&exact);
+    let bands = Band::map(&exact);
     for noisy in &frames {
-        for (who, scores) in scores_of(noisy, &distances, folder, peer)? {
+        for (who, scores) in scores_of(noisy, &bands, folder, peer)? {
             Row::of(name, noisy.noise, &who, scores).iter().for_each(|row| println!("{row}"));
         }
     }
@@ -86,7 +86,7 @@ fn scores(name: &str, folder: &Path, peer: Option<&str>) -> Result<(), String> {
 /// for, if one is named.
 fn scores_of(
     noisy: &Noisy,
-    distances: &Distances,
+    bands: &[Band],
     folder: &Path,
     peer: Option<&str>,
 ) -> Result<Vec<(String, [Score; 3])>, String> {
@@ -103,7 +103,7 @@ fn scores_of(
         let normals = read(path)?;
         pixels.retain(|at| is_normal(normals[*at]));
     }
-    let score = |normals: &[[f32; 3]]| by_band(frame, distances, normals, pixels.iter().copied());
+    let score = |normals: &[[f32; 3]]| by_band(frame, bands, normals, pixels.iter().copied());
     let ours = parallel::map(Mode::all(), |mode| {
         let normals = mode.normals(&frame.points, frame.width()).map_err(|e| e.to_string())?;
         Ok((format!("{OURS}{}", mode.name), score(&normals)))
