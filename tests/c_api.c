@@ -659,12 +659,20 @@ static void test_window(void) {
   iine_estimator_free(e);
 }
 
+/* One refused call of compute_maps. */
+#define REFUSE_MAPS(expected, change)                                        \
+  do {                                                                       \
+    iine_points points = cloud_points();                                     \
+    iine_maps maps = all;                                                    \
+    change;                                                                  \
+    STATUS((expected), iine_estimator_compute_maps(e, &points, &maps));      \
+  } while (0)
+
 static void test_maps(void) {
   static uint8_t depth_changes[PIXELS + 4], untouched_changes[PIXELS + 4];
   static float distances[PIXELS + 1], areas[PIXELS + 1], untouched[PIXELS + 1], three[4 * PIXELS];
   iine_estimator *const e = new_estimator();
   const iine_points points = cloud_points();
-  iine_points bad_points = points;
   iine_maps none, all, maps;
   int i;
   memset(&none, 0, sizeof none);
@@ -683,64 +691,25 @@ static void test_maps(void) {
   STATUS(IINE_ERROR_NULL_POINTER, iine_estimator_compute_maps(NULL, &points, &all));
   STATUS(IINE_ERROR_NULL_POINTER, iine_estimator_compute_maps(e, NULL, &all));
   STATUS(IINE_ERROR_NULL_POINTER, iine_estimator_compute_maps(e, &points, NULL));
-  bad_points.struct_size = 8;
-  STATUS(IINE_ERROR_STRUCT_SIZE, iine_estimator_compute_maps(e, &bad_points, &all));
-  bad_points = points;
-  bad_points.width = 0;
-  STATUS(IINE_ERROR_SIZE, iine_estimator_compute_maps(e, &bad_points, &all));
-  bad_points = points;
-  bad_points.point_stride = 2;
-  STATUS(IINE_ERROR_STRIDE, iine_estimator_compute_maps(e, &bad_points, &all));
-  maps = all;
-  maps.struct_size = sizeof all + 1;
-  STATUS(IINE_ERROR_STRUCT_SIZE, iine_estimator_compute_maps(e, &points, &maps));
-  maps = all;
-  maps.distances = misaligned(distances);
-  STATUS(IINE_ERROR_MISALIGNED, iine_estimator_compute_maps(e, &points, &maps));
-  maps = all;
-  maps.smoothing_areas = misaligned(areas);
-  STATUS(IINE_ERROR_MISALIGNED, iine_estimator_compute_maps(e, &points, &maps));
-  maps = all;
-  maps.smoothing_areas = distances;
-  STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_maps(e, &points, &maps));
-  maps = all;
-  maps.depth_changes = (uint8_t *)(distances + PIXELS) - 1;
-  STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_maps(e, &points, &maps));
-  maps = all;
-  maps.depth_changes = (uint8_t *)cloud;
-  STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_maps(e, &points, &maps));
-  maps = all;
-  maps.distances = &cloud[PIXELS - 1].z;
-  STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_maps(e, &points, &maps));
-  maps = all;
-  maps.eigenvalues = three;
-  maps.smoothing_areas = three + 3 * PIXELS - 1;
-  STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_maps(e, &points, &maps));
-  maps = all;
-  maps.depth_radii = distances;
-  STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_maps(e, &points, &maps));
-  maps = all;
-  maps.depth_radii = three;
-  maps.depth_changes = (uint8_t *)three + 2 * PIXELS;
-  STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_maps(e, &points, &maps));
-  maps = all;
-  maps.smoothing_areas = three;
-  maps.depth_changes = (uint8_t *)three + 2 * PIXELS;
-  STATUS(IINE_ERROR_OVERLAP, iine_estimator_compute_maps(e, &points, &maps));
-  maps = all;
-  maps.depth_radii = misaligned(three);
-  STATUS(IINE_ERROR_MISALIGNED, iine_estimator_compute_maps(e, &points, &maps));
-  maps = all;
-  maps.eigenvalues = misaligned(three);
-  STATUS(IINE_ERROR_MISALIGNED, iine_estimator_compute_maps(e, &points, &maps));
-  maps = all;
-  maps.depth_radii = three; /* not with PCL's semantics */
-  STATUS(IINE_ERROR_UNSUPPORTED, iine_estimator_compute_maps(e, &points, &maps));
-  maps = all;
-  maps.eigenvalues = three; /* not with this method */
-  STATUS(IINE_ERROR_UNSUPPORTED, iine_estimator_compute_maps(e, &points, &maps));
-  maps.struct_size = sizeof all - sizeof(float *);
-  STATUS(IINE_ERROR_STRUCT_SIZE, iine_estimator_compute_maps(e, &points, &maps));
+  REFUSE_MAPS(IINE_ERROR_STRUCT_SIZE, points.struct_size = 8);
+  REFUSE_MAPS(IINE_ERROR_SIZE, points.width = 0);
+  REFUSE_MAPS(IINE_ERROR_STRIDE, points.point_stride = 2);
+  REFUSE_MAPS(IINE_ERROR_STRUCT_SIZE, maps.struct_size += 1);
+  REFUSE_MAPS(IINE_ERROR_STRUCT_SIZE, (maps.eigenvalues = three, maps.struct_size -= sizeof(float *)));
+  REFUSE_MAPS(IINE_ERROR_MISALIGNED, maps.distances = misaligned(distances));
+  REFUSE_MAPS(IINE_ERROR_MISALIGNED, maps.smoothing_areas = misaligned(areas));
+  REFUSE_MAPS(IINE_ERROR_MISALIGNED, maps.depth_radii = misaligned(three));
+  REFUSE_MAPS(IINE_ERROR_MISALIGNED, maps.eigenvalues = misaligned(three));
+  REFUSE_MAPS(IINE_ERROR_OVERLAP, maps.smoothing_areas = distances);
+  REFUSE_MAPS(IINE_ERROR_OVERLAP, maps.depth_changes = (uint8_t *)(distances + PIXELS) - 1);
+  REFUSE_MAPS(IINE_ERROR_OVERLAP, maps.depth_changes = (uint8_t *)cloud);
+  REFUSE_MAPS(IINE_ERROR_OVERLAP, maps.distances = &cloud[PIXELS - 1].z);
+  REFUSE_MAPS(IINE_ERROR_OVERLAP, (maps.eigenvalues = three, maps.smoothing_areas = three + 3 * PIXELS - 1));
+  REFUSE_MAPS(IINE_ERROR_OVERLAP, maps.depth_radii = distances);
+  REFUSE_MAPS(IINE_ERROR_OVERLAP, (maps.depth_radii = three, maps.depth_changes = (uint8_t *)three + 2 * PIXELS));
+  REFUSE_MAPS(IINE_ERROR_OVERLAP, (maps.smoothing_areas = three, maps.depth_changes = (uint8_t *)three + 2 * PIXELS));
+  REFUSE_MAPS(IINE_ERROR_UNSUPPORTED, maps.depth_radii = three); /* not with PCL's semantics */
+  REFUSE_MAPS(IINE_ERROR_UNSUPPORTED, maps.eigenvalues = three); /* not with this method */
   CHECK(memcmp(depth_changes, untouched_changes, sizeof depth_changes) == 0);
   CHECK(memcmp(distances, untouched, sizeof distances) == 0);
   CHECK(memcmp(areas, untouched, sizeof areas) == 0);
