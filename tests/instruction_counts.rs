@@ -12,7 +12,7 @@
 //! pass for both one-sided and crease windows 2.3 times as many, or with zeros for "no return", as many sensors write them,
 //! 3.2 times; PCL's 4 times.
 //!
-//! The program runs itself under valgrind: `frames N SEMANTICS METHOD POLICY METRES PLANE UNITS SECOND` computes N frames of
+//! The program runs itself under valgrind: `count-frames N SEMANTICS METHOD POLICY METRES PLANE UNITS SECOND` computes N frames of
 //! a cloud that is moved to the right by so many metres, and then misses one x, with a plane at that depth in place of
 //! missing points if it is not NaN, in units of which a metre has so many, and with a second pass if that is 1. The counts
 //! are the difference between two frames and one, so neither start nor the first frame's allocations are in them.
