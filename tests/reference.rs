@@ -272,7 +272,6 @@ fn planes_at_all_tilts_match_the_reference() {
             let cloud = Cloud::new(kind, 48, 40, seed);
             differences.add(&cloud, &options(method, 9.0, false), 1);
         }
-        assert!(!differences.angles.is_empty());
         differences.check(&format!("planes {method:?}"), method.0);
     }
 }
