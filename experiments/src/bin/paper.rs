@@ -61,8 +61,7 @@ fn frames(sigma: &str, size: &str) -> Result<(Frame, Frame), String> {
 }
 
 fn write_cloud(sigma: &str, size: &str, path: &Path) -> Result<(), String> {
-    let (_, noisy) = frames(sigma, size)?;
-    exchange::write_cloud(path, &noisy).map_err(|e| format!("{}: {e}", path.display()))
+    exchange::write_cloud(path, &frames(sigma, size)?.1)
 }
 
 /// A method with windows of one side, for noise of this size.
@@ -108,8 +107,7 @@ fn errors(sigma: &str, size: &str, step: &str, cloud: &str, sides: &[&str]) -> R
     for side in sides {
         let points = number::<usize>(side)?.pow(2);
         let path = cloud.replace(".cloud", &format!(".PCL-kNN-{points}.normals"));
-        let normals = exchange::read_normals(&path, noisy.points.len());
-        let normals = normals.map_err(|e| format!("{path}: {e}"))?;
+        let normals = exchange::read_normals(Path::new(&path), noisy.points.len())?;
         print(&format!("PCL-kNN-{points}"), score(&normals));
     }
     Ok(())

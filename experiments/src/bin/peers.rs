@@ -65,8 +65,7 @@ fn frames(name: &str) -> Result<(Frame, Vec<Noisy>), String> {
 
 fn clouds(name: &str, folder: &Path) -> Result<(), String> {
     for Noisy { file, frame, .. } in frames(name)?.1 {
-        let path = folder.join(file + ".cloud");
-        exchange::write_cloud(&path, &frame).map_err(|e| format!("{}: {e}", path.display()))?;
+        exchange::write_cloud(&folder.join(file + ".cloud"), &frame)?;
     }
     Ok(())
 }
@@ -91,10 +90,7 @@ fn scores_of(
     peer: Option<&str>,
 ) -> Result<Vec<(String, [Score; 3])>, String> {
     let frame = &noisy.frame;
-    let read = |path: &Path| {
-        exchange::read_normals(path, frame.points.len())
-            .map_err(|e| format!("{}: {e}", path.display()))
-    };
+    let read = |path: &Path| exchange::read_normals(path, frame.points.len());
     let peers = peers_of(folder, &noisy.file)?;
     let mut pixels: Vec<usize> = (0..frame.points.len()).collect();
     if let Some(peer) = peer {
