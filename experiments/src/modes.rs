@@ -12,7 +12,7 @@ pub struct Mode {
 }
 
 /// A short name of a method.
-pub fn method_name(method: Method, semantics: Semantics) -> &'static str {
+fn method_name(method: Method, semantics: Semantics) -> &'static str {
     match (method, semantics) {
         (Method::CovarianceMatrix, Semantics::Paper) => "CM",
         (Method::AverageDepthChange, Semantics::Paper) => "SDC",

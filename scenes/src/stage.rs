@@ -26,10 +26,10 @@ pub fn scene(name: &str) -> Option<Scene> {
         "sphere" => sphere(),
         "cylinder" => cylinder(),
         "box" => box_on_floor(),
-        "crease-90" => crease(90.0, false, 1.5),
-        "crease-135" => crease(135.0, false, 1.5),
-        "ridge-90" => crease(90.0, true, 1.5),
-        "ridge-135" => crease(135.0, true, 1.5),
+        "crease-90" => crease(90.0, false),
+        "crease-135" => crease(135.0, false),
+        "ridge-90" => crease(90.0, true),
+        "ridge-135" => crease(135.0, true),
         "steps" => steps(),
         "tabletop" => tabletop(),
         "room" => room(),
@@ -45,20 +45,20 @@ pub fn plane(tilt: f64, azimuth: f64, distance: f64) -> Scene {
 }
 
 /// A sphere, 0.75 m away where it is nearest, that fills the middle of the image, and nothing else.
-pub fn sphere() -> Scene {
+fn sphere() -> Scene {
     Scene { shapes: vec![Shape::Sphere { center: [0.0, 0.0, 1.2], radius: 0.45 }] }
 }
 
 /// A leaning cylinder that fills the height of the image, and nothing else.
-pub fn cylinder() -> Scene {
+fn cylinder() -> Scene {
     let axis = unit([0.25, 1.0, 0.1]);
     let base = add([0.0, 0.0, 1.6], scale(axis, -3.0));
     Scene { shapes: vec![Shape::Cylinder { base, axis: scale(axis, 6.0), radius: 0.35 }] }
 }
 
-/// Two planes that meet at `angle` degrees in a line through (0, 0, `distance`), a ridge towards the camera or a
-/// valley. The line is turned 20 degrees from vertical, and one plane faces the camera more than the other.
-pub fn crease(angle: f64, ridge: bool, distance: f64) -> Scene {
+/// Two planes that meet at `angle` degrees in a line through (0, 0, 1.5), a ridge towards the camera or a valley. The
+/// line is turned 20 degrees from vertical, and one plane faces the camera more than the other.
+fn crease(angle: f64, ridge: bool) -> Scene {
     let (sin, cos) = 20f64.to_radians().sin_cos();
     let along: Vector = [-sin, cos, 0.0];
     let across: Vector = [cos, sin, 0.0];
@@ -68,14 +68,14 @@ pub fn crease(angle: f64, ridge: bool, distance: f64) -> Scene {
         // In the plane across the line, from the line towards one side of it.
         let direction = turn + 10f64.to_radians();
         let out = add(scale(across, direction.sin()), [0.0, 0.0, bend * direction.cos()]);
-        let origin = add([0.0, 0.0, distance], scale(along, -20.0));
+        let origin = add([0.0, 0.0, 1.5], scale(along, -20.0));
         Shape::Patch { origin, u: scale(along, 40.0), v: scale(out, 20.0) }
     };
     Scene { shapes: vec![side(-half), side(half)] }
 }
 
 /// A box, turned by 35 degrees, on a floor that is seen from above, before a wall.
-pub fn box_on_floor() -> Scene {
+fn box_on_floor() -> Scene {
     let floor = Floor::new(30.0, [0.0, 0.2, 1.6]);
     let mut shapes = vec![floor.shape(), wall(3.0)];
     shapes.push(floor.cuboid([0.0, 0.0], [0.25, 0.2, 0.3], 35.0));
@@ -83,7 +83,7 @@ pub fn box_on_floor() -> Scene {
 }
 
 /// Frontal strips side by side, each one farther away than the one to its left: by 2, 4, 8, 16, 32 and 64 cm.
-pub fn steps() -> Scene {
+fn steps() -> Scene {
     const STRIPS: i32 = 7;
     const WIDTH: f64 = 0.18; // at z = 1
     let mut z = 1.0;
@@ -99,7 +99,7 @@ pub fn steps() -> Scene {
 }
 
 /// A table with a box, a cylinder and a sphere on it, before a wall.
-pub fn tabletop() -> Scene {
+fn tabletop() -> Scene {
     let table = Floor::new(35.0, [0.0, 0.1, 1.3]);
     Scene {
         shapes: vec![
@@ -113,7 +113,7 @@ pub fn tabletop() -> Scene {
 }
 
 /// The inside of a room, with a box on the floor.
-pub fn room() -> Scene {
+fn room() -> Scene {
     let plane = |point, normal| Shape::Plane { point, normal };
     let turned = |x: f64, y: f64, z: f64| {
         // The camera looks 15 degrees down and 25 degrees to the side.
