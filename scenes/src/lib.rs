@@ -23,7 +23,7 @@ mod vector;
 
 pub use bands::Band;
 pub use noise::{Noise, drop_out};
-pub use pcd::{Pcd, PcdError};
+pub use pcd::Pcd;
 pub use random::Random;
 pub use real::{REAL_FRAMES, real_frame};
 pub use render::{Camera, Frame, NO_SURFACE, Scene};

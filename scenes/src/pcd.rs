@@ -1,6 +1,6 @@
 //! PCD files: points (or normals) of organized clouds.
 
-use std::fmt;
+use std::io;
 use std::path::Path;
 
 use crate::lzf;
@@ -16,32 +16,6 @@ pub struct Pcd {
     pub viewpoint: [f64; 7],
     /// The points, row by row.
     pub points: Vec<[f32; 3]>,
-}
-
-/// Why a file could not be read.
-#[derive(Debug)]
-pub enum PcdError {
-    /// The file system said so.
-    Io(std::io::Error),
-    /// Not a PCD file that this reader understands; the text says what is wrong.
-    Format(&'static str),
-}
-
-impl fmt::Display for PcdError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            PcdError::Io(error) => error.fmt(f),
-            PcdError::Format(text) => f.write_str(text),
-        }
-    }
-}
-
-impl std::error::Error for PcdError {}
-
-impl From<std::io::Error> for PcdError {
-    fn from(error: std::io::Error) -> Self {
-        PcdError::Io(error)
-    }
 }
 
 const IDENTITY: [f64; 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
@@ -87,16 +61,16 @@ fn parse_header(text: &str) -> Option<Header<'_>> {
 impl Pcd {
     /// Reads the points (fields x, y, z of type float) of an ascii, binary or binary_compressed file.
     ///
-    /// Errors: [`PcdError`] if the file cannot be read or is not such a file.
-    pub fn read(path: impl AsRef<Path>) -> Result<Pcd, PcdError> {
+    /// Errors: those of the file system, and [`io::ErrorKind::InvalidData`] if it is not such a file.
+    pub fn read(path: impl AsRef<Path>) -> io::Result<Pcd> {
         Self::parse(&std::fs::read(path)?, ["x", "y", "z"])
     }
 
     /// Reads three fields of type float by their names out of a file's bytes.
     ///
     /// Errors: as [`Pcd::read`].
-    pub fn parse(bytes: &[u8], names: [&str; 3]) -> Result<Pcd, PcdError> {
-        let broken = PcdError::Format;
+    pub fn parse(bytes: &[u8], names: [&str; 3]) -> io::Result<Pcd> {
+        let broken = |text: &str| io::Error::new(io::ErrorKind::InvalidData, text);
         let data_line =
             bytes.windows(5).position(|window| window == b"DATA ").ok_or(broken("no DATA line"))?;
         let line_end =
@@ -149,7 +123,7 @@ impl Pcd {
     }
 
     /// Writes a binary file whose three float fields have these names.
-    pub fn write(&self, path: impl AsRef<Path>, names: [&str; 3]) -> std::io::Result<()> {
+    pub fn write(&self, path: impl AsRef<Path>, names: [&str; 3]) -> io::Result<()> {
         let pixels = self.points.len();
         let viewpoint = self.viewpoint.map(|number| number.to_string()).join(" ");
         let header = format!(
