@@ -12,13 +12,9 @@ pub struct Pcd {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Translation x, y, z and rotation w, x, y, z of the sensor.
-    pub viewpoint: [f64; 7],
     /// The points, row by row.
     pub points: Vec<[f32; 3]>,
 }
-
-const IDENTITY: [f64; 7] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
 struct Header<'a> {
     fields: Vec<&'a str>,
@@ -27,7 +23,6 @@ struct Header<'a> {
     counts: Vec<usize>,
     width: usize,
     height: usize,
-    viewpoint: [f64; 7],
     data: &'a str,
 }
 
@@ -42,10 +37,6 @@ fn parse_header(text: &str) -> Option<Header<'_>> {
         line(key)?.into_iter().map(|word| word.parse().ok()).collect()
     };
     let fields = line("FIELDS")?;
-    let viewpoint = line("VIEWPOINT").map_or(Some(IDENTITY), |words| {
-        let numbers: Option<Vec<f64>> = words.into_iter().map(|word| word.parse().ok()).collect();
-        numbers?.try_into().ok()
-    })?;
     Some(Header {
         sizes: numbers("SIZE")?,
         types: line("TYPE")?,
@@ -53,7 +44,6 @@ fn parse_header(text: &str) -> Option<Header<'_>> {
         fields,
         width: *numbers("WIDTH")?.first()?,
         height: *numbers("HEIGHT")?.first()?,
-        viewpoint,
         data: line("DATA")?.first()?,
     })
 }
@@ -63,13 +53,13 @@ impl Pcd {
     ///
     /// Errors: those of the file system, and [`io::ErrorKind::InvalidData`] if it is not such a file.
     pub fn read(path: impl AsRef<Path>) -> io::Result<Pcd> {
-        Self::parse(&std::fs::read(path)?, ["x", "y", "z"])
+        Self::parse(&std::fs::read(path)?)
     }
 
-    /// Reads three fields of type float by their names out of a file's bytes.
+    /// The same of a file's bytes.
     ///
     /// Errors: as [`Pcd::read`].
-    pub fn parse(bytes: &[u8], names: [&str; 3]) -> io::Result<Pcd> {
+    pub fn parse(bytes: &[u8]) -> io::Result<Pcd> {
         let broken = |text: &str| io::Error::new(io::ErrorKind::InvalidData, text);
         let data_line =
             bytes.windows(5).position(|window| window == b"DATA ").ok_or(broken("no DATA line"))?;
@@ -88,7 +78,7 @@ impl Pcd {
             return Err(broken("the header's lists differ in length"));
         }
         let mut columns = [0; 3];
-        for (column, name) in columns.iter_mut().zip(names) {
+        for (column, name) in columns.iter_mut().zip(["x", "y", "z"]) {
             *column = header
                 .fields
                 .iter()
@@ -119,16 +109,15 @@ impl Pcd {
             _ => return Err(broken("unknown kind of data")),
         };
         let points = points.ok_or(broken("the data is too short"))?;
-        Ok(Pcd { width: header.width, height: header.height, viewpoint: header.viewpoint, points })
+        Ok(Pcd { width: header.width, height: header.height, points })
     }
 
     /// Writes a binary file whose three float fields have these names.
     pub fn write(&self, path: impl AsRef<Path>, names: [&str; 3]) -> io::Result<()> {
         let pixels = self.points.len();
-        let viewpoint = self.viewpoint.map(|number| number.to_string()).join(" ");
         let header = format!(
             "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS {}\nSIZE 4 4 4\nTYPE F F F\n\
-             COUNT 1 1 1\nWIDTH {}\nHEIGHT {}\nVIEWPOINT {viewpoint}\nPOINTS {pixels}\nDATA binary\n",
+             COUNT 1 1 1\nWIDTH {}\nHEIGHT {}\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {pixels}\nDATA binary\n",
             names.join(" "),
             self.width,
             self.height,
@@ -136,11 +125,6 @@ impl Pcd {
         let mut bytes = header.into_bytes();
         bytes.extend(self.points.iter().flatten().flat_map(|number| number.to_le_bytes()));
         std::fs::write(path, bytes)
-    }
-
-    /// A cloud or its normals, seen from the origin.
-    pub fn new(width: usize, height: usize, points: Vec<[f32; 3]>) -> Self {
-        Pcd { width, height, viewpoint: IDENTITY, points }
     }
 }
 

@@ -67,8 +67,8 @@ fn run(mut arguments: impl Iterator<Item = String>) -> Result<(), String> {
     let mut frame = noise.apply(&exact, &mut random);
     drop_out(&mut frame, dropout, &mut random);
     let (width, height) = (frame.width(), frame.height());
-    let write = |path: String, data, names| {
-        let written = Pcd::new(width, height, data).write(&path, names);
+    let write = |path: String, points, names| {
+        let written = Pcd { width, height, points }.write(&path, names);
         written.map_err(|error| format!("{path}: {error}"))
     };
     write(output, frame.points, ["x", "y", "z"])?;
