@@ -42,49 +42,32 @@ impl Noise {
     /// The frame as the sensor sees it.
     pub fn apply(self, exact: &Frame, random: &mut Random) -> Frame {
         let Frame { scene, camera, .. } = exact;
-        let mut noisy = Frame {
-            scene: scene.clone(),
-            camera: camera.clone(),
-            points: Vec::with_capacity(exact.points.len()),
-            normals: Vec::with_capacity(exact.points.len()),
-            surfaces: Vec::with_capacity(exact.points.len()),
-        };
         let matched = match self {
             Noise::Matched => means(camera.width, camera.height, random),
             _ => Vec::new(),
         };
-        for y in 0..camera.height {
-            for x in 0..camera.width {
-                let at = y * camera.width + x;
-                let (x, y) = (x as f64, y as f64);
-                let ray = camera.ray(x, y);
-                let sight = scene.look(ray).and_then(|sight| match self {
-                    Noise::None => Some(sight),
-                    Noise::Gaussian(sigma) => {
-                        Some(Sight { z: sight.z + sigma * random.normal(), ..sight })
-                    }
-                    Noise::Khoshelham => {
-                        Some(Sight { z: through_disparity(sight.z, random.normal()), ..sight })
-                    }
-                    Noise::Matched => {
-                        Some(Sight { z: through_disparity(sight.z, matched[at]), ..sight })
-                    }
-                    Noise::Nguyen => {
-                        let theta = angle(&sight, ray);
-                        let sigma = lateral(theta);
-                        let aside =
-                            camera.ray(x + sigma * random.normal(), y + sigma * random.normal());
-                        let z_noise = random.normal();
-                        scene.look(aside).map(|seen| {
-                            let sigma = axial(angle(&seen, aside), seen.z);
-                            Sight { z: seen.z + sigma * z_noise, ..seen }
-                        })
-                    }
-                });
-                noisy.push(ray, sight.filter(|sight| sight.z > 0.0));
-            }
-        }
-        noisy
+        scene.render_by(camera, |[x, y], ray| {
+            let sight = scene.look(ray)?;
+            let seen = match self {
+                Noise::None => sight,
+                Noise::Gaussian(sigma) => Sight { z: sight.z + sigma * random.normal(), ..sight },
+                Noise::Khoshelham => {
+                    Sight { z: through_disparity(sight.z, random.normal()), ..sight }
+                }
+                Noise::Matched => {
+                    let noise = matched[y * camera.width + x];
+                    Sight { z: through_disparity(sight.z, noise), ..sight }
+                }
+                Noise::Nguyen => {
+                    let sigma = lateral(angle(&sight, ray));
+                    let [x, y] = [x, y].map(|at| at as f64 + sigma * random.normal());
+                    let (aside, z_noise) = (camera.ray(x, y), random.normal());
+                    let seen = scene.look(aside)?;
+                    Sight { z: seen.z + axial(angle(&seen, aside), seen.z) * z_noise, ..seen }
+                }
+            };
+            (seen.z > 0.0).then_some(seen)
+        })
     }
 }
 

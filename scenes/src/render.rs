@@ -74,6 +74,15 @@ impl Scene {
 
     /// The exact organized cloud that the camera sees.
     pub fn render(&self, camera: &Camera) -> Frame {
+        self.render_by(camera, |_, ray| self.look(ray))
+    }
+
+    /// The organized cloud of what `look` gives for each pixel's column and row, and its ray.
+    pub(crate) fn render_by(
+        &self,
+        camera: &Camera,
+        mut look: impl FnMut([usize; 2], Vector) -> Option<Sight>,
+    ) -> Frame {
         let pixels = camera.width * camera.height;
         let mut frame = Frame {
             scene: self.clone(),
@@ -85,7 +94,7 @@ impl Scene {
         for y in 0..camera.height {
             for x in 0..camera.width {
                 let ray = camera.ray(x as f64, y as f64);
-                frame.push(ray, self.look(ray));
+                frame.push(ray, look([x, y], ray));
             }
         }
         frame
@@ -108,7 +117,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    pub(crate) fn push(&mut self, ray: Vector, sight: Option<Sight>) {
+    fn push(&mut self, ray: Vector, sight: Option<Sight>) {
         let (point, normal, surface) = match sight {
             Some(Sight { z, normal, surface }) => (scale(ray, z), normal, surface),
             None => ([f64::NAN; 3], [f64::NAN; 3], NO_SURFACE),
