@@ -347,14 +347,14 @@ printFrames (const std::vector<Frame>& frames, int rounds)
   {
     std::vector<double> copy, pcl, ours, c_api, faster, c_faster, copies, c_copies, pcl_fresh, ours_fresh, fresh_faster;
   };
-  std::map<std::string, Summary> summaries;
-  std::vector<std::string> order;
-  std::string rows;
+  std::string table, rows;
   for (const Method& method : METHODS)
     for (const bool mirror : {false, true})
     {
       if (mirror && method.number == SIMPLE_3D_GRADIENT)
         continue;
+      // Each size for itself, and both together: the targets are for both.
+      std::map<std::string, Summary> summaries;
       for (const float size : {10.0f, 20.0f})
         for (const Frame& frame : frames)
         {
@@ -366,13 +366,9 @@ printFrames (const std::vector<Frame>& frames, int rounds)
                          t.c_api, t.pcl / t.ours, t.pcl / t.c_api, t.c_api / t.copy, comparison.p999,
                          comparison.only_first);
           rows += row;
-          // Each size for itself, and both together: the targets are for both.
           for (const std::string& which : {number (size, "%g"), std::string ("10, 20")})
           {
-            const std::string key = std::string ("| ") + method.name + " | " + (mirror ? "MIRROR" : "IGNORE") + " | " + which;
-            if (summaries.count (key) == 0)
-              order.push_back (key);
-            Summary& s = summaries[key];
+            Summary& s = summaries[which];
             s.copy.push_back (t.copy);
             s.pcl.push_back (t.pcl);
             s.ours.push_back (t.ours);
@@ -387,6 +383,20 @@ printFrames (const std::vector<Frame>& frames, int rounds)
           }
           std::fprintf (stderr, ".");
         }
+      for (const auto& each : summaries)
+      {
+        const Summary& s = each.second;
+        const bool is_of_both = each.first == "10, 20";
+        const std::string asked = is_of_both ? number (mirror ? method.asked_mirror : method.asked_ignore, "%g") : "-";
+        const std::string asked_copies = is_of_both && !mirror ? number (method.asked_memcpy, "%g") : "-";
+        char row[300];
+        std::snprintf (row, sizeof row, "| %s | %s | %s | %.2f | %.1f | %.2f | %.2f | %.1f | %.1f | %s | %.2f | %.2f | %s | %.1f | %.2f | %.1f |\n",
+                       method.name, mirror ? "MIRROR" : "IGNORE", each.first.c_str (), median (s.copy), median (s.pcl),
+                       median (s.ours), median (s.c_api), median (s.faster), median (s.c_faster), asked.c_str (),
+                       median (s.copies), median (s.c_copies), asked_copies.c_str (), median (s.pcl_fresh),
+                       median (s.ours_fresh), median (s.fresh_faster));
+        table += row;
+      }
     }
   std::fprintf (stderr, "\n");
 
@@ -397,23 +407,7 @@ printFrames (const std::vector<Frame>& frames, int rounds)
                "(glibc changes to non-temporal stores above a size that depends on the cache, which shows by image size).\n\n"
                "| method | border | smoothing | memcpy | PCL | our class | C API | class: times faster | C API: times faster "
                "| asked | class: x memcpy | C API: x memcpy | asked | PCL, fresh | our class, fresh | times faster |\n"
-               "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
-  for (const std::string& key : order)
-  {
-    const Summary& s = summaries[key];
-    std::string asked = "-", asked_copies = "-";
-    for (const Method& method : METHODS)
-      if (key.find ("10, 20") != std::string::npos && key.find (std::string (" ") + method.name) != std::string::npos)
-      {
-        const bool mirror = key.find ("MIRROR") != std::string::npos;
-        asked = number (mirror ? method.asked_mirror : method.asked_ignore, "%g");
-        asked_copies = mirror ? "-" : number (method.asked_memcpy, "%g");
-      }
-    std::printf ("%s | %.2f | %.1f | %.2f | %.2f | %.1f | %.1f | %s | %.2f | %.2f | %s | %.1f | %.2f | %.1f |\n", key.c_str (),
-                 median (s.copy), median (s.pcl), median (s.ours), median (s.c_api), median (s.faster),
-                 median (s.c_faster), asked.c_str (), median (s.copies), median (s.c_copies), asked_copies.c_str (),
-                 median (s.pcl_fresh), median (s.ours_fresh), median (s.fresh_faster));
-  }
+               "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n%s", table.c_str ());
   std::printf ("\n### Frame by frame\n\n| frame | method | border | smoothing | memcpy | PCL | our class | C API "
                "| class: times faster | C API: times faster | C API: x memcpy | angle to PCL, p99.9 (deg) | normals PCL lacks |\n"
                "|---|---|---|---|---|---|---|---|---|---|---|---|---|\n%s\n", rows.c_str ());
