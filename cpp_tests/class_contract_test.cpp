@@ -275,6 +275,18 @@ TEST (CallOrders, ReusedForCloudsOfOtherSizes)
     }
 }
 
+TEST (CallOrders, ScratchMemoryIsKeptUntilItIsReleased)
+{
+  Estimator estimator;
+  estimator.setInputCloud (scene ());
+  estimator.setNumberOfThreads (2);
+  const auto before = compute (estimator);
+  EXPECT_GT (estimator.getScratchSize (), 0u);
+  estimator.releaseScratch ();
+  EXPECT_EQ (estimator.getScratchSize (), 0u);
+  EXPECT_TRUE (areEqual (compute (estimator), before));
+}
+
 TEST (CallOrders, TheCloudIsReadAtCompute)
 {
   const Cloud::Ptr cloud = scene ();

@@ -425,6 +425,26 @@ impl<'a> Normals<'a> {
         unsafe { Self::from_grid([nx, nx.wrapping_add(1), nx.wrapping_add(2)], grid, curvature) }
     }
 
+    /// Three separate planes, and if wanted one of curvatures; `row_stride` as in [`Points::planes`].
+    ///
+    /// Errors: [`Error::Size`] if a size is zero or a plane is too short, [`Error::Stride`].
+    pub fn planes(
+        normal: [&'a mut [f32]; 3],
+        curvature: Option<&'a mut [f32]>,
+        width: usize,
+        height: usize,
+        row_stride: usize,
+    ) -> Result<Self, Error> {
+        let grid = float_grid(width, height, 1, row_stride)?;
+        for plane in normal.iter().chain(&curvature) {
+            check_length(plane.len(), &grid, 1)?;
+        }
+        let normal = normal.map(|plane| plane.as_mut_ptr());
+        let curvature = curvature.map(|plane| (plane.as_mut_ptr(), grid));
+        // SAFETY: the planes are borrowed mutably for 'a, and `check_length` saw that each holds a float at every pixel.
+        unsafe { Self::from_grid(normal, grid, curvature) }
+    }
+
     /// A view from the addresses of the first pixel's nx, ny, nz and, if wanted, curvature, which has strides of
     /// its own. Strides are in bytes, multiples of 4; a row stride of 0 means packed rows.
     ///

@@ -65,6 +65,39 @@ fn normals_that_do_not_fit_are_refused() {
 }
 
 #[test]
+fn normals_may_be_planes() {
+    let cloud = Cloud::new(Kind::Wavy, WIDTH, HEIGHT, 1);
+    let method = (Method::CovarianceMatrix, BorderPolicy::Mirror);
+    let mut estimator = Estimator::new(options(method, 3.0, false));
+    let fields = compute(&mut estimator, &cloud);
+    for (row, length) in [(WIDTH, 24), (9, 33)] {
+        let mut planes = vec![[7.0_f32; 33]; 4];
+        for short in 0..=4 {
+            let [nx, ny, nz, curvature]: &mut [_; 4] = planes.first_chunk_mut().unwrap();
+            let mut lengths = [length; 4];
+            lengths.iter_mut().nth(short).into_iter().for_each(|length| *length -= 1);
+            let normal = [&mut nx[..lengths[0]], &mut ny[..lengths[1]], &mut nz[..lengths[2]]];
+            let curvature = Some(&mut curvature[..lengths[3]]);
+            let view = Normals::planes(normal, curvature, WIDTH, HEIGHT, row);
+            if short < 4 {
+                assert_eq!(view.err(), Some(Error::Size), "{short}");
+            } else {
+                estimator.compute(&cloud.view(), &mut view.unwrap()).unwrap();
+            }
+        }
+        for at in 0..33 {
+            let pixel = fields.get(at / row * WIDTH + at % row).filter(|_| at % row < WIDTH);
+            let expected = pixel.copied().unwrap_or([7.0; 4]).map(f32::to_bits);
+            assert_eq!([0, 1, 2, 3].map(|field: usize| planes[field][at].to_bits()), expected);
+        }
+    }
+    let mut planes = [[0.0; 24]; 3];
+    let normal = planes.each_mut().map(|plane| &mut plane[..]);
+    let found = Normals::planes(normal, None, WIDTH, HEIGHT, WIDTH - 1);
+    assert_eq!(found.err(), Some(Error::Stride));
+}
+
+#[test]
 fn outputs_of_another_size_are_refused() {
     let cloud = Cloud::new(Kind::Wavy, WIDTH, HEIGHT, 1);
     let points = cloud.view();

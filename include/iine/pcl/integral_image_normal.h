@@ -500,6 +500,24 @@ namespace iine
         return (iine_alpha_of_sensor (disparity_step, focal, baseline));
       }
 
+      /** \brief Get how much scratch memory is held for the next compute. Not in PCL's class.
+        * \return the size in bytes, without the maps
+        */
+      std::size_t
+      getScratchSize ()
+      {
+        std::size_t bytes = 0;
+        iine_estimator_scratch_size (handle_.get (), &bytes);
+        return (bytes);
+      }
+
+      /** \brief Free the scratch memory and end the worker threads; the next compute makes them anew. Not in PCL's class. */
+      void
+      releaseScratch ()
+      {
+        iine_estimator_release_scratch (handle_.get ());
+      }
+
       /** \brief Get the outcome of the last compute, \ref computePointNormal or \ref computePointNormalMirror. Not in
         * PCL's class.
         * \return IINE_OK (0), or one of IINE_ERROR_*, whose text iine_status_string gives; IINE_ERROR_SIZE for a cloud that
