@@ -4,7 +4,6 @@
 
 #include <math.h>
 #include <stdio.h>
-#include <string.h>
 
 enum { WIDTH = 320, HEIGHT = 240 };
 
@@ -33,14 +32,13 @@ static void make_ramp(void) {
 
 int main(void) {
   iine_estimator *estimator = NULL;
-  iine_points points;
-  iine_normals normals;
+  iine_points points = {0};
+  iine_normals normals = {0};
   int32_t status;
   int i, covered = 0;
 
   make_ramp();
 
-  memset(&points, 0, sizeof points);
   points.struct_size = sizeof points;
   points.width = WIDTH;
   points.height = HEIGHT;
@@ -49,7 +47,6 @@ int main(void) {
   points.z = &cloud[0].z;
   points.point_stride = sizeof(point);
 
-  memset(&normals, 0, sizeof normals);
   normals.struct_size = sizeof normals;
   normals.nx = &cloud[0].nx;
   normals.ny = &cloud[0].ny;

@@ -6,6 +6,8 @@ import ctypes
 
 iine = ctypes.CDLL("libiine.so.0.1")  # by its SONAME: the structs are this version's, see iine/iine.h
 iine.iine_status_string.restype = ctypes.c_char_p
+# ctypes must be told of arguments that are not integers or pointers; so it must for the other setters that take floats.
+iine.iine_estimator_set_normal_smoothing_size.argtypes = ctypes.c_void_p, ctypes.c_float
 
 
 class Points(ctypes.Structure):
@@ -39,6 +41,7 @@ points = Points(ctypes.sizeof(Points), WIDTH, HEIGHT, p, p + 4, p + 8, 12, 0)
 normals = Normals(ctypes.sizeof(Normals), n, n + 4, n + 8, 12)
 estimator = ctypes.c_void_p()
 check(iine.iine_estimator_new(ctypes.byref(estimator)))
+check(iine.iine_estimator_set_normal_smoothing_size(estimator, 8))
 check(iine.iine_estimator_compute(estimator, ctypes.byref(points), ctypes.byref(normals)))
 iine.iine_estimator_free(estimator)
 
