@@ -315,10 +315,7 @@ impl Differences {
             same("R", areas[at], reference.smoothing_radius(x, y));
         }
 
-        // The plain form of the eigenvalues takes its time on large clouds.
-        if pixels < 100_000 {
-            check_eigenvalues(&reference, &mut estimator, &areas, step);
-        }
+        check_eigenvalues(&reference, &mut estimator, &areas, step);
 
         for method in METHODS {
             estimator.options_mut().method = method;
