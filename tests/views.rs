@@ -74,8 +74,7 @@ fn normals_may_be_planes() {
         let mut planes = vec![[7.0_f32; 33]; 4];
         for short in 0..=4 {
             let [nx, ny, nz, curvature]: &mut [_; 4] = planes.first_chunk_mut().unwrap();
-            let mut lengths = [length; 4];
-            lengths.iter_mut().nth(short).into_iter().for_each(|length| *length -= 1);
+            let lengths = [0, 1, 2, 3].map(|plane| length - usize::from(plane == short));
             let normal = [&mut nx[..lengths[0]], &mut ny[..lengths[1]], &mut nz[..lengths[2]]];
             let curvature = Some(&mut curvature[..lengths[3]]);
             let view = Normals::planes(normal, curvature, WIDTH, HEIGHT, row);
