@@ -161,10 +161,13 @@ impl<'a, S: Groups> Group<'a, S> {
         let mut plain = lanes;
         for (lane, one) in ones.into_iter().enumerate() {
             if let Some(one) = one {
+                let [[hx, hy, hz], [vx, vy, vz]] = one;
                 // SAFETY: as the caller's.
-                let one = one.map(|tangent| tangent.map(|c| unsafe { Floats::splat(c) }));
-                // SAFETY: as the caller's.
-                unsafe { take(of8, 1 << lane, one) };
+                unsafe {
+                    let h = [Floats::splat(hx), Floats::splat(hy), Floats::splat(hz)];
+                    let v = [Floats::splat(vx), Floats::splat(vy), Floats::splat(vz)];
+                    take(of8, 1 << lane, [h, v]);
+                }
                 plain &= !(1 << lane);
             }
         }

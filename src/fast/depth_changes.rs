@@ -101,7 +101,7 @@ impl DepthChanges {
         unsafe {
             let far = S::splat(far(points.width(), points.height()));
             let factor = S::splat(factor);
-            let mut range = [f32::INFINITY, f32::NEG_INFINITY].map(|depth| S::splat(depth));
+            let mut range = [S::splat(f32::INFINITY), S::splat(f32::NEG_INFINITY)];
             let end = z[segment - 1].load::<S>();
             let end_right = z[segment].load::<S>();
             let bound = threshold::<S>(end, factor);

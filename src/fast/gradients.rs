@@ -154,11 +154,11 @@ impl Gradients {
         let from = self.0[at..at + S::LANES].as_ptr().cast::<f32>();
         // SAFETY: as the caller's; so many pixels' gradients are there.
         unsafe {
-            let gradients = |first: usize| {
-                let [x, y, z] = S::load_points(from.add(first), PIXEL);
-                [Floats(x), Floats(y), Floats(z)]
-            };
-            scale.normals(gradients(0), gradients(VERTICAL), sides)
+            let [hx, hy, hz] = S::load_points(from, PIXEL);
+            let [vx, vy, vz] = S::load_points(from.add(VERTICAL), PIXEL);
+            let (h, v) =
+                ([Floats(hx), Floats(hy), Floats(hz)], [Floats(vx), Floats(vy), Floats(vz)]);
+            scale.normals(h, v, sides)
         }
     }
 }

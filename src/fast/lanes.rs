@@ -108,7 +108,8 @@ impl LaneOrder {
                 // SAFETY: as the caller's; the points are whole.
                 unsafe {
                     let first = from.sub(2);
-                    let four = [0, 1, 2, 3].map(|l| S::load(first.byte_add(l * lane_stride)));
+                    let at = |lane: usize| first.byte_add(lane * lane_stride);
+                    let four = [S::load(first), S::load(at(1)), S::load(at(2)), S::load(at(3))];
                     let [_, _, z, _] = S::transpose_fours(four);
                     let finite_or_nan = S::add(z, S::sub(z, z));
                     let to = |point: usize| to.add((element + point) * LANES + lane);

@@ -39,7 +39,8 @@ impl Lanewise {
                 rows[lane] = S::load_d(self.most[lane].as_ptr());
             }
             let [xx, xy, xz, yy, yz, zz, x, y] = S::transpose_d(rows).map(Doubles);
-            let [z, share] = [&self.z, &self.share].map(|from| Doubles(S::load_d(from.as_ptr())));
+            let z = Doubles(S::load_d(self.z.as_ptr()));
+            let share = Doubles(S::load_d(self.share.as_ptr()));
             WindowMoments { sums: [x, y, z, xx, xy, xz, yy, yz, zz], share }
         }
     }

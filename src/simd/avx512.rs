@@ -332,7 +332,8 @@ impl Simd for Avx512Pair {
             if step != size_of::<[f32; 4]>() {
                 return load_points_by_fours::<Self>(first, step);
             }
-            let [a, b, c, d] = [0, 1, 2, 3].map(|i| _mm512_loadu_ps(first.add(16 * i)));
+            let (a, b) = (_mm512_loadu_ps(first), _mm512_loadu_ps(first.add(16)));
+            let (c, d) = (_mm512_loadu_ps(first.add(32)), _mm512_loadu_ps(first.add(48)));
             // Of eight points: x and y, or z.
             let xy = _mm512_setr_epi32(0, 4, 8, 12, 16, 20, 24, 28, 1, 5, 9, 13, 17, 21, 25, 29);
             let z = _mm512_setr_epi32(2, 6, 10, 14, 18, 22, 26, 30, 0, 0, 0, 0, 0, 0, 0, 0);

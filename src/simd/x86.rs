@@ -270,8 +270,9 @@ impl Along for Sse2 {
         for half in 0..2 {
             for four in 0..2 {
                 unsafe {
-                    let [mut a, mut b, mut c, mut d] =
-                        [0, 1, 2, 3].map(|i| _mm_castsi128_ps(rows[4 * four + i][half]));
+                    let row = |i: usize| rows[4 * four + i][half];
+                    let (mut a, mut b) = (_mm_castsi128_ps(row(0)), _mm_castsi128_ps(row(1)));
+                    let (mut c, mut d) = (_mm_castsi128_ps(row(2)), _mm_castsi128_ps(row(3)));
                     _MM_TRANSPOSE4_PS(&mut a, &mut b, &mut c, &mut d);
                     for (lane, row) in [a, b, c, d].into_iter().enumerate() {
                         _mm_storeu_ps(to.add(8 * (4 * half + lane) + 4 * four).cast(), row);

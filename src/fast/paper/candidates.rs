@@ -73,8 +73,8 @@ impl<S: Simd> Windows<S> {
     #[inline(always)]
     unsafe fn none() -> Self {
         // SAFETY: as the caller's.
-        let [zero, per_misfit, even] =
-            unsafe { [0.0, 1.0, f32::INFINITY].map(|value| Floats::splat(value)) };
+        let (zero, per_misfit, even) =
+            unsafe { (Floats::splat(0.0), Floats::splat(1.0), Floats::splat(f32::INFINITY)) };
         let (middle, q, ray) = ([zero; 2], [zero; 3], [zero; 3]);
         let [radius, bend2, jitter] = [zero; 3];
         Windows { middle, radius, q, ray, per_misfit, bend2, even, jitter }

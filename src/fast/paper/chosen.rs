@@ -116,7 +116,9 @@ impl ChosenRow<'_> {
             let mut fields = [nx.0, ny.0, nz.0, curvature];
             if written != lanes {
                 let (there, none) = (S::mask(lanes), S::splat(f32::NAN));
-                fields = fields.map(|field| S::select(there, field, none));
+                for field in &mut fields {
+                    *field = S::select(there, *field, none);
+                }
             }
             if written == all(S::LANES) {
                 return normals.write_lanes::<S>(x, y, fields);

@@ -21,16 +21,17 @@ pub(super) unsafe fn between<S: Simd>(
     for x in (0..whole).step_by(S::LANES) {
         // SAFETY: as the caller's; there are so many depths.
         unsafe {
-            let [depth, next] = [before, behind].map(|row| S::load(row.as_ptr().add(x)));
+            let depth = S::load(before.as_ptr().add(x));
+            let next = S::load(behind.as_ptr().add(x));
             let least = least_depth_change::<S>(depth, options);
             let difference = S::abs(S::sub(next, depth));
             let change = match options.semantics {
                 Semantics::Paper => S::le(least, difference),
                 Semantics::Pcl => S::lt(least, difference),
             };
-            let [there, there_next] = [depth, next].map(|depth| S::bits(S::eq(depth, depth)));
+            let is_behind_gap = S::and_not(S::eq(depth, depth), S::eq(next, next));
             mark(changes, x, S::bits(change).into());
-            mark(behind_gaps, x, (there_next & !there).into());
+            mark(behind_gaps, x, S::bits(is_behind_gap).into());
         }
     }
     plain_between([before, behind], [changes, behind_gaps], options, whole);

@@ -209,14 +209,14 @@ impl<S: Groups> Fits<S> {
         unsafe {
             // As `Plane::estimate` has it.
             let share = Doubles::splat(1.0) / dot(self.q, self.q).sqrt();
-            let normal = self.q.map(|q| q * share);
+            let normal = [self.q[0] * share, self.q[1] * share, self.q[2] * share];
             let [xx, .., yy, _, zz] = self.covariance;
             let curvature = dot(normal, times(self.covariance, normal)) / (xx + yy + zz);
             let most = Floats::splat(Plane::MOST_CURVATURE as f32);
             let curvature = Floats::splat(0.0).max(curvature.narrow()).min(most);
-            let [x, y, z] = normal.map(|field| field.narrow().0);
-            let to = found.as_mut_ptr().cast();
-            S::store_points([x, y, z, curvature.0], 3, to, size_of::<[f32; 4]>());
+            let [x, y, z] = [normal[0].narrow(), normal[1].narrow(), normal[2].narrow()];
+            let (fields, to) = ([x.0, y.0, z.0, curvature.0], found.as_mut_ptr().cast());
+            S::store_points(fields, 3, to, size_of::<[f32; 4]>());
             if jagged != 0 {
                 let mut matrices = [[0.0; GROUP]; 6];
                 for (to, from) in matrices.iter_mut().zip(self.covariance) {
@@ -279,10 +279,13 @@ impl<S: Groups> Found<S> {
                     bend2,
                 ],
             ];
-            let to = found.as_mut_ptr().cast::<f32>();
+            let (to, there) = (found.as_mut_ptr().cast::<f32>(), S::mask(there));
             for (fields, place) in fours.into_iter().zip((0..).step_by(4)) {
-                let fields = fields.map(|field| S::and(S::mask(there), field.0));
-                S::store_points(fields, 3, to.add(place), size_of::<EvenWindow>());
+                let mut of_windows = [there; 4];
+                for i in 0..4 {
+                    of_windows[i] = S::and(there, fields[i].0);
+                }
+                S::store_points(of_windows, 3, to.add(place), size_of::<EvenWindow>());
             }
         }
         for lane in Bits(asked) {
@@ -475,8 +478,8 @@ impl EvenTile<'_> {
                 let is_better = even & fits.there & !is_enough;
                 let bends = even & fits.there & is_enough & !compared;
                 if bends != 0 {
-                    let sides = [found, radii].map(|radii| radii + radii + one);
-                    let sides2 = sides[0] * sides[0] - sides[1] * sides[1];
+                    let (side, of_half) = (found + found + one, radii + radii + one);
+                    let sides2 = side * side - of_half * of_half;
                     bend2.take(S::mask(bends), best.bend2(&fits, sides2, least, area));
                 }
                 found.take(S::mask(is_jagged | is_better), radii);

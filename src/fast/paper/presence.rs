@@ -81,11 +81,11 @@ impl Presence {
         let row = &mut self.rows[(y & (rows - 1)) * words..][..words];
         let block = ((y / WORD) & (blocks - 1)) * columns;
         let column = &mut self.columns[block..][..columns];
-        let bit = [1 << (y % WORD); LANES];
+        let bit = [1_u32 << (y % WORD); LANES];
         let kept = [if y.is_multiple_of(WORD) { 0 } else { u32::MAX }; LANES];
         // SAFETY: as the caller's; lanes of floats are taken for words of bits.
         unsafe {
-            let [bit, kept] = [bit, kept].map(|word: [u32; LANES]| S::load(word.as_ptr().cast()));
+            let (bit, kept) = (S::load(bit.as_ptr().cast()), S::load(kept.as_ptr().cast()));
             let weights = weights.chunks(WORD).zip(column.chunks_mut(WORD));
             for (word, (weights, column)) in row.iter_mut().zip(weights) {
                 *word = 0;
