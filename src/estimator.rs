@@ -34,8 +34,8 @@ pub struct Maps<'a> {
     pub smoothing_areas: Option<&'a mut [f32]>,
     /// Eigenvalues of the covariance matrix (Eq. 16) of the finite points in every pixel's window, ascending, for
     /// edge and corner detection: three for every pixel, one after the other, so that this map holds
-    /// 3 x width x height elements. In the cloud's unit squared; NaN where there is no window. Only with
-    /// [`Method::CovarianceMatrix`](crate::Method::CovarianceMatrix).
+    /// 3 x width x height elements. In the cloud's unit squared; NaN where there is no window, or no finite point in it.
+    /// Only with [`Method::CovarianceMatrix`](crate::Method::CovarianceMatrix).
     pub eigenvalues: Option<&'a mut [f32]>,
 }
 

@@ -1,5 +1,6 @@
 //! Work shared out among threads. Items are fixed by the frame, not by the number of threads, so results are too.
 
+use std::panic::resume_unwind;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -125,12 +126,25 @@ impl Workers {
             }
         };
         // The calling thread works too: schedulers tend to wake others on the core of one that goes to sleep.
-        pool.in_place_scope(|scope| {
-            let run = &run;
-            for worker in 1..self.count() {
-                scope.spawn(move |_| run(worker));
+        let run_all = || {
+            pool.in_place_scope(|scope| {
+                let run = &run;
+                for worker in 1..self.count() {
+                    scope.spawn(move |_| run(worker));
+                }
+                run(0);
+            });
+        };
+        if rayon::current_thread_index().is_none() {
+            return run_all();
+        }
+        // The calling thread is one of a pool of the caller's. Waiting itself, it would meanwhile do other work of that pool,
+        // which may want what is held for this one, or compute normals with the same estimator.
+        std::thread::scope(|scope| {
+            match std::thread::Builder::new().spawn_scoped(scope, run_all) {
+                Ok(waiting) => waiting.join().unwrap_or_else(|panic| resume_unwind(panic)),
+                Err(_) => (0..items).for_each(|item| work(0, item)),
             }
-            run(0);
         });
     }
 }

@@ -4,7 +4,7 @@
 mod clouds;
 
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+use std::cell::{Cell, RefCell};
 use std::process::Command;
 
 use clouds::{
@@ -327,6 +327,28 @@ fn assert_writes_nothing(estimator: &mut Estimator, cloud: &Cloud, error: Error)
 
 /// Runs this test once more, in a process where stacks are large and two to three of them take the address space:
 /// what is left beside them is more than all else that a thread asks for, or the thread would abort.
+/// While one of a pool's threads waits for the normals it must not do other work of that pool, such as to compute more.
+#[test]
+fn threads_of_a_pool_of_the_callers_wait_for_their_own_frames() {
+    thread_local! {
+        static ESTIMATOR: RefCell<Estimator> = RefCell::new(Estimator::new(Options::default()));
+    }
+    let cloud = Cloud::new(Kind::Wavy, 160, 120, 25);
+    let expected = compute(&mut Estimator::new(Options::default()), &cloud);
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().unwrap();
+    pool.scope(|scope| {
+        for _ in 0..300 {
+            scope.spawn(|_| {
+                ESTIMATOR.with_borrow_mut(|estimator| {
+                    estimator.options_mut().threads = 2;
+                    let found = compute(estimator, &cloud);
+                    assert_same_bits(&found, &expected, cloud.width, "in a pool");
+                });
+            });
+        }
+    });
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn threads_that_cannot_start_are_an_error() {

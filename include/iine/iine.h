@@ -301,8 +301,8 @@ typedef struct iine_maps {
   float *depth_radii;
   /**
    * Eigenvalues of the covariance matrix (Eq. 16) of the finite points in every pixel's window, in the cloud's unit
-   * squared: three for every pixel, ascending, so 3 * width * height elements; NaN where there is no window.
-   * Only with IINE_METHOD_COVARIANCE_MATRIX.
+   * squared: three for every pixel, ascending, so 3 * width * height elements; NaN where there is no window, or no
+   * finite point in it. Only with IINE_METHOD_COVARIANCE_MATRIX.
    */
   float *eigenvalues;
 } iine_maps;

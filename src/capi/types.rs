@@ -141,8 +141,8 @@ pub struct iine_maps {
     /// Only with IINE_SEMANTICS_PAPER.
     pub depth_radii: *mut f32,
     /// Eigenvalues of the covariance matrix (Eq. 16) of the finite points in every pixel's window, in the cloud's unit
-    /// squared: three for every pixel, ascending, so 3 * width * height elements; NaN where there is no window.
-    /// Only with IINE_METHOD_COVARIANCE_MATRIX.
+    /// squared: three for every pixel, ascending, so 3 * width * height elements; NaN where there is no window, or no
+    /// finite point in it. Only with IINE_METHOD_COVARIANCE_MATRIX.
     pub eigenvalues: *mut f32,
 }
 

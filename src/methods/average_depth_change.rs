@@ -74,6 +74,12 @@ fn single_precision_normal(a: [f32; 3], b: [f32; 3]) -> Estimate {
     if !is_length(squared_length.into()) {
         return Estimate::NONE;
     }
+    if squared_length < f32::MIN_POSITIVE / f32::EPSILON {
+        // Squares that small have few digits.
+        let n = n.map(f64::from);
+        let length = dot(n, n).sqrt();
+        return Estimate { normal: n.map(|c| (c / length) as f32), curvature: f32::NAN };
+    }
     let scale = 1.0 / squared_length.sqrt();
     Estimate { normal: n.map(|c| c * scale), curvature: f32::NAN }
 }
@@ -82,6 +88,18 @@ fn single_precision_normal(a: [f32; 3], b: [f32; 3]) -> Estimate {
 mod tests {
     use super::*;
     use crate::options::BorderPolicy;
+
+    #[test]
+    fn the_smallest_normals_have_unit_length() {
+        for exponent in -24..=0 {
+            let size = 10_f32.powi(exponent);
+            let found = single_precision_normal([size, 0.0, 0.3 * size], [size, 0.0, 0.7 * size]);
+            let length = found.normal.map(f64::from).map(|c| c * c).iter().sum::<f64>().sqrt();
+            let is_one = (length - 1.0).abs() < 1e-6;
+            // PCL's floats say that there is none where their squares are 0.
+            assert!(is_one || exponent < -11 && length.is_nan(), "1e{exponent}: {length}");
+        }
+    }
 
     /// The right half window of a pixel of the last column takes away that column's depths, and of the others there is one:
     /// to PCL their mean is next to 0.

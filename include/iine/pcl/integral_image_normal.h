@@ -303,7 +303,7 @@ namespace iine
       /** \brief Get the eigenvalues of the covariance matrix of every pixel's window of the last computed cloud. Not in
         * PCL's class; with COVARIANCE_MATRIX only.
         * \param[out] map 3 * width * height values in the cloud's unit squared, row by row: three for every pixel,
-        * ascending; NaN where there is no window
+        * ascending; NaN where there is no window, or no finite point in it
         * \return as \ref getDepthChangeMap
         */
       bool
