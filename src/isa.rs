@@ -23,6 +23,15 @@ pub enum Isa {
     Neon,
 }
 
+/// That of [`Baseline`](crate::simd::Baseline).
+const BASELINE: Isa = if cfg!(target_arch = "x86_64") {
+    Isa::Sse2
+} else if cfg!(target_arch = "aarch64") {
+    Isa::Neon
+} else {
+    Isa::Portable
+};
+
 impl Isa {
     /// Every instruction set, the best last.
     pub const ALL: [Isa; 6] =
@@ -48,9 +57,6 @@ impl Isa {
     pub fn is_available(self) -> bool {
         match self {
             Isa::Scalar => true,
-            Isa::Portable => !cfg!(any(target_arch = "x86_64", target_arch = "aarch64")),
-            #[cfg(target_arch = "x86_64")]
-            Isa::Sse2 => true,
             #[cfg(target_arch = "x86_64")]
             Isa::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
             #[cfg(target_arch = "x86_64")]
@@ -61,9 +67,7 @@ impl Isa {
                     && is_x86_feature_detected!("avx512dq")
                     && is_x86_feature_detected!("avx512bw")
             }
-            #[cfg(target_arch = "aarch64")]
-            Isa::Neon => true,
-            _ => false,
+            _ => self == BASELINE,
         }
     }
 

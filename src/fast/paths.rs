@@ -1,12 +1,9 @@
 //! The outermost functions, each compiled for its instruction set.
 
 use crate::isa::Isa;
-use crate::simd::Groups;
+use crate::simd::{Baseline, Groups};
 #[cfg(target_arch = "x86_64")]
-use crate::simd::{
-    avx512::Avx512,
-    x86::{Avx2, Sse2},
-};
+use crate::simd::{avx512::Avx512, x86::Avx2};
 
 /// Work that is compiled for every instruction set; `run` is `#[inline(always)]`.
 pub(super) trait Task {
@@ -29,16 +26,11 @@ macro_rules! path {
     };
 }
 
-#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-path!(portable, crate::simd::portable::Portable);
-#[cfg(target_arch = "x86_64")]
-path!(sse2, Sse2);
+path!(baseline, Baseline);
 #[cfg(target_arch = "x86_64")]
 path!(avx2, Avx2, "avx2,fma");
 #[cfg(target_arch = "x86_64")]
 path!(avx512, Avx512, "avx2,fma,avx512f,avx512vl,avx512dq,avx512bw");
-#[cfg(target_arch = "aarch64")]
-path!(neon, crate::simd::neon::Neon, "neon");
 
 /// # Safety
 /// The processor has the instruction set, and what the task asks for.
@@ -50,12 +42,7 @@ pub(super) unsafe fn run<T: Task>(isa: Isa, task: T) -> T::Output {
             Isa::Avx512 => avx512(task),
             #[cfg(target_arch = "x86_64")]
             Isa::Avx2 => avx2(task),
-            #[cfg(target_arch = "x86_64")]
-            _ => sse2(task),
-            #[cfg(target_arch = "aarch64")]
-            _ => neon(task),
-            #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
-            _ => portable(task),
+            _ => baseline(task),
         }
     }
 }

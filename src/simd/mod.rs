@@ -4,22 +4,30 @@
 //! path is compiled for its instruction set. No operation reorders, and products are fused with sums only where that is
 //! asked for: so all paths that fuse give the same bits, and so do all that cannot.
 
-#[cfg(any(target_arch = "x86_64", target_arch = "aarch64"))]
+// Without a baseline of its own an architecture uses no registers, and with one only tests use the portable path.
+#[allow(unused_macros)]
 #[macro_use]
 mod registers;
-
-#[cfg(any(test, not(any(target_arch = "x86_64", target_arch = "aarch64"))))]
-pub(crate) mod portable;
-#[cfg(all(test, any(target_arch = "x86_64", target_arch = "aarch64")))]
-mod tests;
-pub(crate) mod twice;
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx512;
 #[cfg(target_arch = "aarch64")]
-pub(crate) mod neon;
+mod neon;
+#[allow(dead_code)]
+pub(crate) mod portable;
+#[cfg(test)]
+mod tests;
+mod twice;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod x86;
+
+/// What every processor of the architecture has.
+#[cfg(target_arch = "aarch64")]
+pub(crate) use neon::Neon as Baseline;
+#[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
+pub(crate) use portable::Portable as Baseline;
+#[cfg(target_arch = "x86_64")]
+pub(crate) use x86::Sse2 as Baseline;
 
 /// Pixels in a group.
 pub(crate) const GROUP: usize = 8;
@@ -234,7 +242,6 @@ unsafe fn load_points_by_fours<S: Along>(first: *const f32, step: usize) -> [S::
 ///
 /// # Safety
 /// As [`Simd`].
-#[cfg(any(test, not(target_arch = "x86_64")))]
 #[inline(always)]
 unsafe fn store_points_by_lanes<S: Simd>(
     fields: [S::F; 4],
