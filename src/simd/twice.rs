@@ -1,6 +1,6 @@
 //! Sixteen pixels as two groups of eight: twice as many operations that do not wait for one another.
 
-use super::Simd;
+use super::{GROUP, Simd};
 
 /// Two groups of `S`. Masks of lanes have 16 bits, the first group's in the lower half.
 #[derive(Clone, Copy)]
@@ -12,6 +12,29 @@ macro_rules! both {
         unsafe fn $name($($operand: Self::$type),*) -> Self::$result {
             // SAFETY: as the caller's.
             unsafe { [S::$name($($operand[0]),*), S::$name($($operand[1]),*)] }
+        })*
+    };
+}
+
+macro_rules! memory {
+    ($($number:ident, $type:ident, $splat:ident, $load:ident, $store:ident;)*) => {
+        $(#[inline(always)]
+        unsafe fn $splat(value: $number) -> Self::$type {
+            // SAFETY: as the caller's.
+            [unsafe { S::$splat(value) }; 2]
+        }
+        #[inline(always)]
+        unsafe fn $load(from: *const $number) -> Self::$type {
+            // SAFETY: as the caller's.
+            unsafe { [S::$load(from), S::$load(from.add(GROUP))] }
+        }
+        #[inline(always)]
+        unsafe fn $store(to: *mut $number, value: Self::$type) {
+            // SAFETY: as the caller's.
+            unsafe {
+                S::$store(to, value[0]);
+                S::$store(to.add(GROUP), value[1]);
+            }
         })*
     };
 }
@@ -57,60 +80,12 @@ impl<S: Simd> Simd for Twice<S> {
         narrow(a: D) -> F;
     }
 
-    #[inline(always)]
-    unsafe fn splat(value: f32) -> Self::F {
-        // SAFETY: as the caller's.
-        [unsafe { S::splat(value) }; 2]
+    memory! {
+        f32, F, splat, load, store;
+        i32, I, splat_i, load_i, store_i;
+        f64, D, splat_d, load_d, store_d;
     }
-    #[inline(always)]
-    unsafe fn splat_i(value: i32) -> Self::I {
-        // SAFETY: as the caller's.
-        [unsafe { S::splat_i(value) }; 2]
-    }
-    #[inline(always)]
-    unsafe fn splat_d(value: f64) -> Self::D {
-        // SAFETY: as the caller's.
-        [unsafe { S::splat_d(value) }; 2]
-    }
-    #[inline(always)]
-    unsafe fn load(from: *const f32) -> Self::F {
-        // SAFETY: as the caller's.
-        unsafe { [S::load(from), S::load(from.add(super::GROUP))] }
-    }
-    #[inline(always)]
-    unsafe fn store(to: *mut f32, value: Self::F) {
-        // SAFETY: as the caller's.
-        unsafe {
-            S::store(to, value[0]);
-            S::store(to.add(super::GROUP), value[1]);
-        }
-    }
-    #[inline(always)]
-    unsafe fn load_i(from: *const i32) -> Self::I {
-        // SAFETY: as the caller's.
-        unsafe { [S::load_i(from), S::load_i(from.add(super::GROUP))] }
-    }
-    #[inline(always)]
-    unsafe fn store_i(to: *mut i32, value: Self::I) {
-        // SAFETY: as the caller's.
-        unsafe {
-            S::store_i(to, value[0]);
-            S::store_i(to.add(super::GROUP), value[1]);
-        }
-    }
-    #[inline(always)]
-    unsafe fn load_d(from: *const f64) -> Self::D {
-        // SAFETY: as the caller's.
-        unsafe { [S::load_d(from), S::load_d(from.add(super::GROUP))] }
-    }
-    #[inline(always)]
-    unsafe fn store_d(to: *mut f64, value: Self::D) {
-        // SAFETY: as the caller's.
-        unsafe {
-            S::store_d(to, value[0]);
-            S::store_d(to.add(super::GROUP), value[1]);
-        }
-    }
+
     #[inline(always)]
     unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
         // SAFETY: as the caller's.
@@ -133,7 +108,7 @@ impl<S: Simd> Simd for Twice<S> {
     #[inline(always)]
     unsafe fn mask(bits: u32) -> Self::F {
         // SAFETY: as the caller's.
-        unsafe { [S::mask(bits), S::mask(bits >> super::GROUP)] }
+        unsafe { [S::mask(bits), S::mask(bits >> GROUP)] }
     }
     #[inline(always)]
     unsafe fn next_lane(a: Self::F, before: Self::F) -> Self::F {
@@ -148,22 +123,22 @@ impl<S: Simd> Simd for Twice<S> {
     #[inline(always)]
     unsafe fn bits(mask: Self::F) -> u32 {
         // SAFETY: as the caller's.
-        unsafe { S::bits(mask[0]) | S::bits(mask[1]) << super::GROUP }
+        unsafe { S::bits(mask[0]) | S::bits(mask[1]) << GROUP }
     }
     #[inline(always)]
     unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32 {
         // SAFETY: as the caller's.
-        unsafe { S::bits_lt_d(a[0], b[0]) | S::bits_lt_d(a[1], b[1]) << super::GROUP }
+        unsafe { S::bits_lt_d(a[0], b[0]) | S::bits_lt_d(a[1], b[1]) << GROUP }
     }
     #[inline(always)]
     unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
-        let upper = lanes >> super::GROUP;
+        let upper = lanes >> GROUP;
         // SAFETY: as the caller's.
         unsafe { [S::select_i(lanes, yes[0], no[0]), S::select_i(upper, yes[1], no[1])] }
     }
     #[inline(always)]
     unsafe fn select_bits_d(lanes: u32, yes: Self::D, no: Self::D) -> Self::D {
-        let upper = lanes >> super::GROUP;
+        let upper = lanes >> GROUP;
         // SAFETY: as the caller's.
         unsafe { [S::select_bits_d(lanes, yes[0], no[0]), S::select_bits_d(upper, yes[1], no[1])] }
     }
