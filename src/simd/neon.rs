@@ -51,6 +51,7 @@ impl Simd for Neon {
     type D = [float64x2_t; 4];
 
     calls! {
+        load_points(first: *const f32, step: usize) -> [Self::F; 3] = load_points_by_fours::<Self>;
         store_points(fields: [Self::F; 4], place: usize, first: *mut f32, step: usize) = store_points_by_lanes::<Self>;
     }
 
@@ -240,10 +241,6 @@ impl Simd for Neon {
                 vcvt_high_f32_f64(vcvt_f32_f64(a[2]), a[3]),
             ]
         }
-    }
-    #[inline(always)]
-    unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
-        unsafe { load_points_by_fours::<Self>(first, step) }
     }
 }
 

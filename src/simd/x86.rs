@@ -60,6 +60,10 @@ impl Simd for Sse2 {
     type I = [__m128i; 2];
     type D = [__m128d; 4];
 
+    calls! {
+        load_points(first: *const f32, step: usize) -> [Self::F; 3] = load_points_by_fours::<Self>;
+    }
+
     calls! { of 2:
         add(a: Self::F, b: Self::F) -> Self::F = _mm_add_ps;
         sub(a: Self::F, b: Self::F) -> Self::F = _mm_sub_ps;
@@ -212,10 +216,6 @@ impl Simd for Sse2 {
                 _mm_movelh_ps(_mm_cvtpd_ps(a[2]), _mm_cvtpd_ps(a[3])),
             ]
         }
-    }
-    #[inline(always)]
-    unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
-        unsafe { load_points_by_fours::<Self>(first, step) }
     }
     #[inline(always)]
     unsafe fn store_points(fields: [Self::F; 4], place: usize, first: *mut f32, step: usize) {
@@ -407,6 +407,7 @@ impl Simd for Avx2 {
         round_i(a: Self::F) -> Self::I = _mm256_cvtps_epi32;
         truncate_i(a: Self::F) -> Self::I = _mm256_cvttps_epi32;
         float_i(a: Self::I) -> Self::F = _mm256_cvtepi32_ps;
+        load_points(first: *const f32, step: usize) -> [Self::F; 3] = load_points_by_fours::<Self>;
     }
 
     calls! { of 2:
@@ -508,10 +509,6 @@ impl Simd for Avx2 {
     #[inline(always)]
     unsafe fn narrow(a: Self::D) -> Self::F {
         unsafe { _mm256_set_m128(_mm256_cvtpd_ps(a[1]), _mm256_cvtpd_ps(a[0])) }
-    }
-    #[inline(always)]
-    unsafe fn load_points(first: *const f32, step: usize) -> [Self::F; 3] {
-        unsafe { load_points_by_fours::<Self>(first, step) }
     }
     #[inline(always)]
     unsafe fn store_points(fields: [Self::F; 4], place: usize, first: *mut f32, step: usize) {
