@@ -75,7 +75,7 @@ fn all_precise(lanes: u32, precisely: impl Fn(usize) -> Option<Estimate>) -> (Es
 }
 
 /// Normals and curvatures of pixels side by side.
-#[repr(C, align(64))]
+#[repr(align(64))]
 pub(crate) struct Estimates {
     pub normal: [[f32; LANES]; 3],
     pub curvature: [f32; LANES],
@@ -110,13 +110,13 @@ impl Estimates {
             let normal = turned(normal, point, viewpoint);
             let mask = S::mask(lanes);
             let none = S::splat(f32::NAN);
-            let mut estimates = std::mem::MaybeUninit::<Self>::uninit();
-            let to = estimates.as_mut_ptr().cast::<f32>();
+            let mut estimates = Self::NONE;
             for c in 0..3 {
-                S::store(to.add(c * LANES), S::select(mask, normal[c].0, none));
+                let to = estimates.normal[c].as_mut_ptr();
+                S::store(to, S::select(mask, normal[c].0, none));
             }
-            S::store(to.add(3 * LANES), S::select(mask, curvature.0, none));
-            estimates.assume_init()
+            S::store(estimates.curvature.as_mut_ptr(), S::select(mask, curvature.0, none));
+            estimates
         }
     }
 }
