@@ -6,13 +6,6 @@ pub(crate) const BLOCK: usize = 4;
 /// Columns and rows before a block's middle pixel.
 pub(crate) const MIDDLE: usize = BLOCK / 2;
 
-/// The middle column or row, of so many in the image, of a block of `size` that starts at `first`; where that is cut off,
-/// the last one inside the image.
-#[inline(always)]
-pub(crate) fn middle(first: usize, size: usize, count: usize) -> usize {
-    (first + size / 2).min(count - 1)
-}
-
 /// The columns or rows of blocks, of so many, at a distance before `at`, its own, and behind it.
 pub(crate) fn lines_around(at: usize, distance: usize, count: usize) -> [usize; 3] {
     [at.saturating_sub(distance), at, (at + distance).min(count - 1)]
@@ -42,14 +35,15 @@ impl Blocks {
         (block % self.across, block / self.across)
     }
 
-    /// Column and row of a block's middle pixel.
+    /// Column and row of a block's middle pixel; where that is cut off, the last ones inside the image.
     pub fn middle(&self, block: usize) -> (usize, usize) {
         self.middle_of(self.place(block))
     }
 
     /// That of the block in a column and row of blocks.
     pub fn middle_of(&self, (column, row): (usize, usize)) -> (usize, usize) {
-        (middle(column * BLOCK, BLOCK, self.width), middle(row * BLOCK, BLOCK, self.height))
+        let middle = |line: usize, count: usize| (line * BLOCK + MIDDLE).min(count - 1);
+        (middle(column, self.width), middle(row, self.height))
     }
 
     /// The block that a pixel is in.

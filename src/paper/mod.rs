@@ -22,7 +22,7 @@ pub(crate) mod smoothing_area;
 mod summed_area;
 mod surroundings;
 
-pub(crate) use blocks::{BLOCK, Blocks, MIDDLE, middle};
+pub(crate) use blocks::{BLOCK, Blocks, MIDDLE};
 pub(crate) use choices::{
     ALIKE, CREASE_COST, CREASE_NOISE, EvenWindows, MISFIT, NEAR_NOISE, NEXT, NO_WINDOW, REACH,
     inverse_depth_along, places_at,

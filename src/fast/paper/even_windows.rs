@@ -15,7 +15,7 @@ use crate::fast::sink::Sink;
 use crate::paper::{
     Asked, BLOCK, CHANCE, Cloud, EvenWindow, JAGGED, JAGGED_LINES, JAGGED_POINTS, JAGGED_RADIUS,
     MIDDLE, Noise, Plane, RELIEF, RELIEF_RADIUS, ROUNDING, TAKEN, estimate_in_space, estimate_of,
-    even_window, middle,
+    even_window,
 };
 use crate::simd::{GROUP, Groups};
 use crate::vector::dot;
@@ -317,8 +317,7 @@ impl EvenTile<'_> {
         let mut run = Run::default();
         let mut some_wait = false;
         for y in tile.rows.clone() {
-            let first = y / BLOCK * BLOCK;
-            let has_middles = y == middle(first, BLOCK, even.cloud.height);
+            let has_middles = y == even.asked.blocks.middle_of((0, y / BLOCK)).1;
             if sink.is_none() && !has_middles {
                 continue;
             }
@@ -331,7 +330,7 @@ impl EvenTile<'_> {
                     );
                 }
                 if has_middles {
-                    some_wait |= self.row::<S>(rings, first, error);
+                    some_wait |= self.row::<S>(rings, error);
                 }
             }
         }
@@ -339,18 +338,18 @@ impl EvenTile<'_> {
         (layer.hides_some() && some_wait).then_some(rings.nearest_hidden)
     }
 
-    /// The windows of the blocks that start in row `first`; returns whether some wait for another layer.
+    /// The windows of the blocks in the row aimed at, that of their middles; returns whether some wait for another layer.
     ///
     /// # Safety
     /// As [`EvenTile::compute`]; the rings hold what the windows need.
     #[inline(always)]
-    unsafe fn row<S: Groups>(&self, rings: &Rings<MOMENTS>, first: usize, error: f64) -> bool {
+    unsafe fn row<S: Groups>(&self, rings: &Rings<MOMENTS>, error: f64) -> bool {
         let &Even { cloud, asked, .. } = self.even;
         let (width, columns) = (cloud.width, &self.tile.columns);
         let is_later = !rings.layer.is_first;
         let mut some_wait = false;
         for x in columns.clone().step_by(GROUP * BLOCK) {
-            let block = asked.blocks.block(first * width + x);
+            let block = asked.blocks.block(rings.aimed.y * width + x);
             let blocks = block..block + (columns.end - x).div_ceil(BLOCK).min(GROUP);
             let pixels = Pixels { x: x + MIDDLE, step: BLOCK, width };
             // SAFETY: as the caller's.
