@@ -6,8 +6,7 @@
 
 use super::arithmetic::{Floats, Integers, between};
 use super::estimates::Found;
-use super::lanes::Bits;
-use super::lanes::LANES;
+use super::lanes::{Bits, LANES};
 use super::pair::Pair;
 use super::planes::Frame;
 use super::run::{Noted, RUN};

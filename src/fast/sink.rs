@@ -3,8 +3,7 @@
 use std::ops::Range;
 
 use super::estimates::Estimates;
-use super::lanes::LANES;
-use super::lanes::{Bits, all};
+use super::lanes::{Bits, LANES, all};
 use crate::Error;
 use crate::cloud::Normals;
 use crate::memory::refill;

@@ -4,8 +4,7 @@
 use crate::cloud::{Normals, Points};
 use crate::fast::arithmetic::Floats;
 use crate::fast::estimates::turned;
-use crate::fast::lanes::LANES;
-use crate::fast::lanes::{Bits, all};
+use crate::fast::lanes::{Bits, LANES, all};
 use crate::fast::paths::Task;
 use crate::options::Options;
 use crate::paper::{Cloud, NO_WINDOW, SecondPass};
