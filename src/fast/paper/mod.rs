@@ -341,8 +341,7 @@ impl Job<'_> {
         workers.share(parts, |worker, parts| {
             let sweep = &mut lock(&each[worker]).paper.sweep;
             for (Chunk { swept, own, .. }, map) in parts {
-                let (first, count, own) = (swept.start, swept.len(), own.clone());
-                let rows = Rows { width, first, count, own, depths, map };
+                let rows = Rows { width, swept: swept.clone(), own: own.clone(), depths, map };
                 let task = SweepTask { rows, options, sweep };
                 // SAFETY: the processor has the instruction set.
                 let radius = unsafe { paths::run(self.isa, task) };

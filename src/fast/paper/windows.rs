@@ -49,11 +49,10 @@ pub(crate) struct Sweep {
     along: Buffer<Lanes>,
 }
 
-/// The rows that are swept: the depths of the whole image, and the map's rows from the first one on.
+/// The rows that are swept: the depths of the whole image, and their own rows of the map.
 pub(crate) struct Rows<'a> {
     pub width: usize,
-    pub first: usize,
-    pub count: usize,
+    pub swept: Range<usize>,
     /// Those whose radii are asked for: the others may lack depth changes behind the ends.
     pub own: Range<usize>,
     pub depths: &'a [f32],
@@ -70,7 +69,7 @@ impl Rows<'_> {
     #[inline(always)]
     fn map(&mut self, y: usize) -> &mut [f32] {
         let length = row_length(self.width);
-        let start = (y - self.first) * length;
+        let start = (y - self.swept.start) * length;
         &mut self.map[start..start + length]
     }
 
@@ -124,7 +123,7 @@ impl Sweep {
     #[inline(always)]
     unsafe fn down<S: Simd>(&mut self, rows: &mut Rows, options: &PaperOptions) {
         let length = row_length(rows.width);
-        let (first, end) = (rows.first, rows.first + rows.count);
+        let Range { start: first, end } = rows.swept;
         self.look_up(rows);
         // SAFETY: as the caller's; all rows and buffers have the length of a row of depths.
         unsafe {
@@ -160,10 +159,11 @@ impl Sweep {
 
     /// The last depths at or above the first row.
     fn look_up(&mut self, rows: &Rows) {
+        let first = rows.swept.start;
         for x in 0..row_length(rows.width) {
-            let above = (0..=rows.first).rev().find(|y| !rows.depths(*y)[x].is_nan());
+            let above = (0..=first).rev().find(|y| !rows.depths(*y)[x].is_nan());
             self.last[x] = above.map_or(f32::NAN, |y| rows.depths(y)[x]);
-            self.gap[x] = above.map_or(1, |y| rows.first - y + 1) as f32;
+            self.gap[x] = above.map_or(1, |y| first - y + 1) as f32;
         }
     }
 
@@ -216,7 +216,7 @@ impl Sweep {
         // SAFETY: as the caller's; the margins are as wide as the search is.
         unsafe {
             let mut largest = S::splat(0.0);
-            for y in (rows.first..rows.first + rows.count).rev() {
+            for y in rows.swept.clone().rev() {
                 let map = rows.map(y).as_mut_ptr();
                 for x in (0..inside).step_by(LANES) {
                     let below = below.as_mut_ptr().add(x);
