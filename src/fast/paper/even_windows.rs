@@ -326,7 +326,7 @@ impl EvenTile<'_> {
                 let error = tile.advance::<S, _, MOMENTS>(&method, rings, &mut next, y);
                 if let Some(sink) = sink {
                     tile.row::<S, CovarianceMatrix, MOMENTS, true>(
-                        rings, waiting, sink, &mut run, y, error,
+                        rings, waiting, sink, &mut run, error,
                     );
                 }
                 if has_middles {

@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use super::integrals::{Rings, WEIGHT};
+use super::integrals::{Aimed, Rings, WEIGHT};
 use super::layers::{Layer, Waiting, with_fraction};
 use super::methods::Sums;
 use super::rects::{Pixels, Rects, Rows};
@@ -69,7 +69,7 @@ impl Tile<'_> {
             // SAFETY: as the caller's.
             unsafe {
                 let error = self.advance::<S, M, N>(method, rings, &mut next, y);
-                self.row::<S, M, N, PARTIAL>(rings, waiting, sink, &mut run, y, error);
+                self.row::<S, M, N, PARTIAL>(rings, waiting, sink, &mut run, error);
             }
         }
         (layer.hides_some() && waiting.is_any()).then_some(rings.nearest_hidden)
@@ -172,11 +172,10 @@ impl Tile<'_> {
         waiting: &mut Waiting,
         sink: &Sink,
         run: &mut Run<M::OfRun>,
-        y: usize,
         error: f64,
     ) {
         let width = self.points.width();
-        let layer = rings.layer;
+        let &Rings { layer, aimed: Aimed { y, .. }, .. } = rings;
         let radii = (self.row)(y).1;
         let (marks, inverted) = match self.written {
             Written::All => (None, 0),
@@ -374,15 +373,15 @@ unsafe fn with_hidden<S: Groups, M: Sums<N>, const N: usize>(
 /// Pixels of a row whose normals are found step by step, each step for all of them.
 pub(super) struct Run<T> {
     /// The first one's column.
-    pub start: usize,
-    pub radii: [f32; RUN],
-    pub sums: T,
-    pub points: OfRun<f32, 3>,
+    start: usize,
+    radii: [f32; RUN],
+    sums: T,
+    points: OfRun<f32, 3>,
     /// The lanes of each pair of groups that have a window, and those that are left out.
-    pub lanes: [u32; RUN / LANES],
-    pub left_out: [u32; RUN / LANES],
+    lanes: [u32; RUN / LANES],
+    left_out: [u32; RUN / LANES],
     /// Those whose points may be on one line of the image.
-    pub few: [u32; RUN / LANES],
+    few: [u32; RUN / LANES],
 }
 
 impl<T: Default> Default for Run<T> {
