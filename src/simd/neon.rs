@@ -314,68 +314,8 @@ impl Groups for Neon {
     type Pair = Twice<Self>;
     type Widest = Self;
 
-    #[inline(always)]
-    unsafe fn load_fours_d(place: impl Fn(usize) -> *const f64) -> Self::D {
-        unsafe {
-            let two = |i: usize| place(i / 2).add(i % 2 * 2);
-            [vld1q_f64(two(0)), vld1q_f64(two(1)), vld1q_f64(two(2)), vld1q_f64(two(3))]
-        }
-    }
-    #[inline(always)]
-    unsafe fn store_fours_d(value: Self::D, place: impl Fn(usize) -> *mut f64) {
-        for (i, two) in value.into_iter().enumerate() {
-            unsafe { vst1q_f64(place(i / 2).add(i % 2 * 2), two) };
-        }
-    }
-    #[inline(always)]
-    unsafe fn transpose_fours_d(rows: [Self::D; 4]) -> [Self::D; 4] {
-        let [a, b, c, d] = rows;
-        let mut columns = rows;
-        for half in [0, 2] {
-            for i in 0..2 {
-                unsafe {
-                    columns[2 * i][half] = vtrn1q_f64(a[half + i], b[half + i]);
-                    columns[2 * i][half + 1] = vtrn1q_f64(c[half + i], d[half + i]);
-                    columns[2 * i + 1][half] = vtrn2q_f64(a[half + i], b[half + i]);
-                    columns[2 * i + 1][half + 1] = vtrn2q_f64(c[half + i], d[half + i]);
-                }
-            }
-        }
-        columns
-    }
-    #[inline(always)]
-    unsafe fn join_halves_d(a: Self::D, b: Self::D) -> [Self::D; 2] {
-        [[a[0], a[1], b[0], b[1]], [a[2], a[3], b[2], b[3]]]
-    }
-    #[inline(always)]
-    unsafe fn load_pairs_d(place: impl Fn(usize) -> *const f64) -> Self::D {
-        unsafe {
-            [vld1q_f64(place(0)), vld1q_f64(place(1)), vld1q_f64(place(2)), vld1q_f64(place(3))]
-        }
-    }
-    #[inline(always)]
-    unsafe fn pair_d(a: Self::D, b: Self::D) -> [Self::D; 2] {
-        let mut pairs = [a, b];
-        for i in 0..4 {
-            unsafe {
-                pairs[i / 2][i % 2 * 2] = vtrn1q_f64(a[i], b[i]);
-                pairs[i / 2][i % 2 * 2 + 1] = vtrn2q_f64(a[i], b[i]);
-            }
-        }
-        pairs
-    }
-    #[inline(always)]
-    unsafe fn unpair_d(first: Self::D, last: Self::D) -> [Self::D; 2] {
-        let mut lanes = [first, last];
-        for i in 0..4 {
-            unsafe {
-                let two = &[first, last][i / 2][i % 2 * 2..];
-                lanes[0][i] = vtrn1q_f64(two[0], two[1]);
-                lanes[1][i] = vtrn2q_f64(two[0], two[1]);
-            }
-        }
-        lanes
-    }
+    doubles_by_twos! { vld1q_f64, vst1q_f64, vtrn1q_f64, vtrn2q_f64 }
+
     #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
         /// Four lanes: each gets the one before, then the one two before.

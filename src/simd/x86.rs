@@ -287,70 +287,8 @@ impl Groups for Sse2 {
     type Pair = Twice<Self>;
     type Widest = Self;
 
-    #[inline(always)]
-    unsafe fn load_fours_d(place: impl Fn(usize) -> *const f64) -> Self::D {
-        unsafe {
-            let two = |i: usize| place(i / 2).add(i % 2 * 2);
-            [_mm_loadu_pd(two(0)), _mm_loadu_pd(two(1)), _mm_loadu_pd(two(2)), _mm_loadu_pd(two(3))]
-        }
-    }
-    #[inline(always)]
-    unsafe fn store_fours_d(value: Self::D, place: impl Fn(usize) -> *mut f64) {
-        for (i, two) in value.into_iter().enumerate() {
-            unsafe { _mm_storeu_pd(place(i / 2).add(i % 2 * 2), two) };
-        }
-    }
-    #[inline(always)]
-    unsafe fn transpose_fours_d(rows: [Self::D; 4]) -> [Self::D; 4] {
-        let [a, b, c, d] = rows;
-        let mut columns = rows;
-        for half in [0, 2] {
-            for i in 0..2 {
-                unsafe {
-                    columns[2 * i][half] = _mm_unpacklo_pd(a[half + i], b[half + i]);
-                    columns[2 * i][half + 1] = _mm_unpacklo_pd(c[half + i], d[half + i]);
-                    columns[2 * i + 1][half] = _mm_unpackhi_pd(a[half + i], b[half + i]);
-                    columns[2 * i + 1][half + 1] = _mm_unpackhi_pd(c[half + i], d[half + i]);
-                }
-            }
-        }
-        columns
-    }
-    #[inline(always)]
-    unsafe fn join_halves_d(a: Self::D, b: Self::D) -> [Self::D; 2] {
-        [[a[0], a[1], b[0], b[1]], [a[2], a[3], b[2], b[3]]]
-    }
-    #[inline(always)]
-    unsafe fn load_pairs_d(place: impl Fn(usize) -> *const f64) -> Self::D {
-        let mut pairs = [unsafe { _mm_setzero_pd() }; 4];
-        for (i, pair) in pairs.iter_mut().enumerate() {
-            *pair = unsafe { _mm_loadu_pd(place(i)) };
-        }
-        pairs
-    }
-    #[inline(always)]
-    unsafe fn pair_d(a: Self::D, b: Self::D) -> [Self::D; 2] {
-        let mut pairs = [a, b];
-        for i in 0..4 {
-            unsafe {
-                pairs[i / 2][i % 2 * 2] = _mm_unpacklo_pd(a[i], b[i]);
-                pairs[i / 2][i % 2 * 2 + 1] = _mm_unpackhi_pd(a[i], b[i]);
-            }
-        }
-        pairs
-    }
-    #[inline(always)]
-    unsafe fn unpair_d(first: Self::D, last: Self::D) -> [Self::D; 2] {
-        let mut lanes = [first, last];
-        for i in 0..4 {
-            unsafe {
-                let two = &[first, last][i / 2][i % 2 * 2..];
-                lanes[0][i] = _mm_unpacklo_pd(two[0], two[1]);
-                lanes[1][i] = _mm_unpackhi_pd(two[0], two[1]);
-            }
-        }
-        lanes
-    }
+    doubles_by_twos! { _mm_loadu_pd, _mm_storeu_pd, _mm_unpacklo_pd, _mm_unpackhi_pd }
+
     #[inline(always)]
     unsafe fn prefix_sum_d(a: Self::D) -> Self::D {
         /// Four lanes: each gets the one before, then the one two before.
