@@ -74,7 +74,7 @@ pub(crate) enum Rects<S: Groups> {
 }
 
 /// Pixel numbers in a group.
-pub(crate) const STEPS: [f32; GROUP] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+const STEPS: [f32; GROUP] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 impl<S: Groups> Rects<S> {
     /// The windows of these radii, as [`Rect::around`](crate::rect::Rect::around) has them, of the row that the rings are aimed at; those
