@@ -3,9 +3,9 @@
 //! First the windows of a slice of the image's rows (`windows`: `depth_changes`, `distance`, `smoothing_area`), then tile
 //! by tile, and if need be layer by layer (`layers`), the points (`planes`, `incomplete`), the method's rings of sums
 //! (`strip_pairs`, `strips`, `moments`, `half_windows`) and, run by run (`run`), the normals (`matrices`, `gradients`;
-//! `tile`, `row`, `one_point`, `estimates`). Slices are made of whole strips; strips, tiles and layers are fixed by the frame and
-//! the options, so that results do not depend on the number of threads. Rings of integers go on from one strip to the next
-//! where a thread makes both: their sums are the same to the bit.
+//! `tile`, `row`, `pair`, `one_point`, `estimates`). Slices are made of whole strips; strips, tiles and layers are fixed by
+//! the frame and the options, so that results do not depend on the number of threads. Rings of integers go on from one
+//! strip to the next where a thread makes both: their sums are the same to the bit.
 
 mod arithmetic;
 mod buffer;
