@@ -228,14 +228,11 @@ fn inclusive(file: &Path) -> [u64; 3] {
     };
     let total = sum(&|line| line.contains("PROGRAM TOTALS"));
     assert!(total > 0, "callgrind_annotate: {text}");
-    // Methods of `Job`, in the module that has it or in another one.
+    // Methods of `Job`, "Job::name", or of another module "<impl Job>::name".
     let stage = |names: &[&str]| {
-        sum(&|line| {
-            let is = |name: &&str| {
-                ["Job::", "Job>::"].iter().any(|job| line.contains(&format!("{job}{name} [")))
-            };
-            names.iter().any(is)
-        })
+        let is =
+            |line: &str, name: &str| line.contains("Job") && line.contains(&format!("::{name} ["));
+        sum(&|line| names.iter().any(|name| is(line, name)))
     };
     [total, stage(&["sweep", "depths", "radii"]), stage(&["tiles"])]
 }

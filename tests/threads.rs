@@ -325,8 +325,6 @@ fn assert_writes_nothing(estimator: &mut Estimator, cloud: &Cloud, error: Error)
     assert!(found.as_flattened().iter().all(|c| *c == 7.0), "partial output");
 }
 
-/// Runs this test once more, in a process where stacks are large and two to three of them take the address space:
-/// what is left beside them is more than all else that a thread asks for, or the thread would abort.
 /// While one of a pool's threads waits for the normals it must not do other work of that pool, such as to compute more.
 #[test]
 fn threads_of_a_pool_of_the_callers_wait_for_their_own_frames() {
@@ -349,6 +347,8 @@ fn threads_of_a_pool_of_the_callers_wait_for_their_own_frames() {
     });
 }
 
+/// Runs this test once more, in a process where stacks are large and two to three of them take the address space:
+/// what is left beside them is more than all else that a thread asks for, or the thread would abort.
 #[cfg(target_os = "linux")]
 #[test]
 fn threads_that_cannot_start_are_an_error() {

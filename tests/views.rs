@@ -71,9 +71,9 @@ fn normals_may_be_planes() {
     let mut estimator = Estimator::new(options(method, 3.0, false));
     let fields = compute(&mut estimator, &cloud);
     for (row, length) in [(WIDTH, 24), (9, 33)] {
-        let mut planes = vec![[7.0_f32; 33]; 4];
+        let mut planes = [[7.0_f32; 33]; 4];
         for short in 0..=4 {
-            let [nx, ny, nz, curvature]: &mut [_; 4] = planes.first_chunk_mut().unwrap();
+            let [nx, ny, nz, curvature] = &mut planes;
             let lengths = [0, 1, 2, 3].map(|plane| length - usize::from(plane == short));
             let normal = [&mut nx[..lengths[0]], &mut ny[..lengths[1]], &mut nz[..lengths[2]]];
             let curvature = Some(&mut curvature[..lengths[3]]);
@@ -87,7 +87,7 @@ fn normals_may_be_planes() {
         for at in 0..33 {
             let pixel = fields.get(at / row * WIDTH + at % row).filter(|_| at % row < WIDTH);
             let expected = pixel.copied().unwrap_or([7.0; 4]).map(f32::to_bits);
-            assert_eq!([0, 1, 2, 3].map(|field: usize| planes[field][at].to_bits()), expected);
+            assert_eq!(planes.map(|plane| plane[at].to_bits()), expected);
         }
     }
     let mut planes = [[0.0; 24]; 3];

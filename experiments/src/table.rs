@@ -32,6 +32,9 @@ pub struct Row {
 }
 
 impl Row {
+    /// The names of the columns.
+    pub const HEADER: &str = "scene,noise,who,band,points,normals,mean,median,folded";
+
     /// The rows of a method's scores by band.
     pub fn of(scene: &str, noise: &str, who: &str, bands: [Score; 3]) -> [Row; 4] {
         let mut all = Score::default();

@@ -82,6 +82,7 @@ fn rows_are_read_back() {
         assert_eq!(row.mean, 6.0);
     }
     assert_eq!((rows[3].points, rows[3].normals), (12, 6));
+    assert_eq!(rows[0].to_string().split(',').count(), Row::HEADER.split(',').count());
     assert!("box,none,1".parse::<Row>().is_err());
 }
 

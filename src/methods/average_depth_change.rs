@@ -1,7 +1,7 @@
 //! AVERAGE_DEPTH_CHANGE: the paper's SDC (Eq. 9-15) as PCL computes it: mean depths of four half windows for the
 //! tangents' z, single points for their x and y.
 
-use super::{Estimate, is_length, normal_of_tangents, start};
+use super::{Estimate, is_length, normal_along, normal_of_tangents, start};
 use crate::cloud::Points;
 use crate::vector::{cross, dot};
 use crate::window::Image;
@@ -76,9 +76,7 @@ fn single_precision_normal(a: [f32; 3], b: [f32; 3]) -> Estimate {
     }
     if squared_length < f32::MIN_POSITIVE / f32::EPSILON {
         // Squares that small have few digits.
-        let n = n.map(f64::from);
-        let length = dot(n, n).sqrt();
-        return Estimate { normal: n.map(|c| (c / length) as f32), curvature: f32::NAN };
+        return normal_along(n.map(f64::from));
     }
     let scale = 1.0 / squared_length.sqrt();
     Estimate { normal: n.map(|c| c * scale), curvature: f32::NAN }

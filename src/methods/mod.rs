@@ -80,11 +80,16 @@ pub(crate) fn is_length(length: f64) -> bool {
 /// The unit vector along the cross product of two tangents; none if they are parallel or not finite.
 #[inline(always)]
 pub(crate) fn normal_of_tangents(first: [f64; 3], second: [f64; 3]) -> Estimate {
-    let n = cross(first, second);
-    let squared_length = dot(n, n);
+    normal_along(cross(first, second))
+}
+
+/// The unit vector of a direction; none if this has no length.
+#[inline(always)]
+fn normal_along(direction: [f64; 3]) -> Estimate {
+    let squared_length = dot(direction, direction);
     if !is_length(squared_length) {
         return Estimate::NONE;
     }
     let length = squared_length.sqrt();
-    Estimate { normal: n.map(|c| (c / length) as f32), curvature: f32::NAN }
+    Estimate { normal: direction.map(|c| (c / length) as f32), curvature: f32::NAN }
 }
