@@ -2,7 +2,7 @@
 
 mod clouds;
 
-use clouds::{Cloud, Kind, Random, compute, compute_listed, fast_isas};
+use clouds::{Cloud, Kind, Random, angle, compute, compute_listed, fast_isas, normal};
 use iine::{
     BorderPolicy, Depth, DistanceMetric, Estimator, Isa, Maps, Method, Normals, Options, Semantics,
 };
@@ -209,6 +209,55 @@ fn nothing_panics_beyond_pcl() {
     }
     println!("{clouds} clouds, {with_normal} normals");
     assert!(with_normal > 100_000);
+}
+
+/// What docs/paper.md promises of one-sided and crease windows: scaled by a power of two, as far as depths and 1/alpha stay
+/// between 1e-12 and 1e15, a cloud has the same normals.
+#[test]
+fn windows_near_edges_are_the_same_in_any_unit() {
+    let mut random = Random::new(24);
+    let mut normals = 0;
+    for seed in 0..400 {
+        let cloud = Cloud::random(&mut random);
+        let mut options = clouds::random_options(&mut random);
+        [options.one_sided_windows, options.crease_windows] =
+            random.pick(&[[true, false], [false, true], [true, true]]);
+        // Lengths of PCL's own that do not scale, and windows of 3 pixels that it sums in floats.
+        options.depth_dependent_smoothing = false;
+        options.max_depth_change_factor = f32::INFINITY;
+        if options.method == Method::AverageDepthChange {
+            options.semantics = Semantics::Paper;
+        }
+        let coordinates = cloud.points.iter().flatten().map(|c| c.abs());
+        let lengths = coordinates.filter(|c| c.is_finite()).chain([options.paper.alpha.recip()]);
+        let depths = cloud.points.iter().map(|point| point[2].abs());
+        let depths = depths.filter(|z| z.is_finite() && *z > 0.0);
+        let largest = lengths.fold(0.0, f32::max);
+        let least = depths.chain([options.paper.alpha.recip()]).fold(f32::MAX, f32::min);
+        let isa = random.pick(&Isa::ALL);
+        let expected = compute(&mut Estimator::with_isa(options.clone(), isa), &cloud);
+        for exponent in [(1e15 / largest).log2().floor(), (1e-12 / least).log2().ceil()] {
+            let unit = exponent.exp2();
+            let mut scaled = cloud.clone();
+            scaled.points.iter_mut().flatten().for_each(|c| *c *= unit);
+            let mut options = options.clone();
+            options.viewpoint = options.viewpoint.map(|c| c * unit);
+            options.paper.alpha /= unit;
+            options.paper.beta /= unit;
+            let found = compute(&mut Estimator::with_isa(options.clone(), isa), &scaled);
+            for (at, (a, b)) in found.iter().zip(&expected).enumerate() {
+                let [a, b] = [a, b].map(normal);
+                normals += usize::from(a.is_some());
+                let is_same = match (a, b) {
+                    (Some(a), Some(b)) => angle(a, b) < 1e-3,
+                    (a, b) => a.is_none() && b.is_none(),
+                };
+                let (x, y) = (at % cloud.width, at / cloud.width);
+                assert!(is_same, "seed {seed} {isa:?} {x},{y} {unit}: {a:?}, {b:?}; {options:?}");
+            }
+        }
+    }
+    assert!(normals > 1_000_000, "{normals}");
 }
 
 #[test]
