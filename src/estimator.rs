@@ -23,8 +23,9 @@ pub struct Maps<'a> {
     pub depth_radii: Option<&'a mut [f32]>,
     /// Depth change indication map (the paper's C): 1 at a depth change, else 0. With
     /// [`Semantics::Pcl`](crate::Semantics::Pcl) both pixels of a change are marked, and those at and beside a z that is not
-    /// finite; with [`Semantics::Paper`](crate::Semantics::Paper) the pixel before the change (Eq. 7), and missing points are
-    /// none.
+    /// finite, but two of the last row or column are never told apart, as in PCL; with
+    /// [`Semantics::Paper`](crate::Semantics::Paper) the pixel before the change (Eq. 7): of missing points only the last one
+    /// before a change across them.
     pub depth_changes: Option<&'a mut [u8]>,
     /// Distance to the nearest depth change in pixels (the paper's T; PCL's `getDistanceMap`). Without any in the image:
     /// width + height, with [`Semantics::Paper`](crate::Semantics::Paper) infinity.

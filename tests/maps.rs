@@ -181,6 +181,54 @@ fn the_ignored_border_is_of_whole_pixels() {
     }
 }
 
+/// The paper's C: that a point is missing is no change, but a change across missing points is marked at the last of them.
+#[test]
+fn of_missing_points_the_last_before_a_change_is_marked() {
+    let missing = [f32::NAN; 3];
+    for (behind, marked) in [(1.0, None), (3.0, Some(3))] {
+        let along = |at: usize| if at < 2 { 1.0 } else { behind };
+        for is_row in [true, false] {
+            let cloud = Cloud::of(6, 6, |x, y| match if is_row { x } else { y } {
+                2 | 3 => missing,
+                at => [x as f32 * 0.01, y as f32 * 0.01, along(at)],
+            });
+            let mut options = Options::default();
+            options.semantics = Semantics::Paper;
+            let mut changes = vec![7; 36];
+            let mut maps = Maps { depth_changes: Some(&mut changes), ..Maps::default() };
+            Estimator::new(options).compute_maps(&cloud.view(), &mut maps).unwrap();
+            for (at, change) in changes.into_iter().enumerate() {
+                let place = if is_row { at % 6 } else { at / 6 };
+                assert_eq!(change == 1, marked == Some(place), "{behind} {is_row}: {at}");
+            }
+        }
+    }
+}
+
+/// PCL's map: a z that is not finite marks its pixel and those beside it, but not along the last row and column.
+#[test]
+fn pixels_of_the_last_row_or_column_are_not_told_apart() {
+    let (width, height) = (7, 6);
+    for missing in 0..width * height {
+        let mut cloud = Cloud::of(width, height, |x, y| [x as f32 * 0.01, y as f32 * 0.01, 1.0]);
+        cloud.points[missing] = [f32::NAN; 3];
+        let mut changes = vec![7; width * height];
+        let mut maps = Maps { depth_changes: Some(&mut changes), ..Maps::default() };
+        Estimator::new(Options::default()).compute_maps(&cloud.view(), &mut maps).unwrap();
+        let (at_x, at_y) = (missing % width, missing / width);
+        let is_last = |x: usize, y: usize| x == width - 1 || y == height - 1;
+        for (at, change) in changes.into_iter().enumerate() {
+            let (x, y) = (at % width, at / width);
+            // Told apart by the left or upper one of the two.
+            let is_beside =
+                x.abs_diff(at_x) + y.abs_diff(at_y) == 1 && !is_last(x.min(at_x), y.min(at_y));
+            let is_corner = (at_x, at_y) == (width - 1, height - 1);
+            let is_marked = is_beside || at == missing && !is_corner;
+            assert_eq!(change == 1, is_marked, "{at_x},{at_y}: {x},{y}");
+        }
+    }
+}
+
 #[test]
 fn zeros_that_are_missing_are_as_nan() {
     for seed in 0..6 {

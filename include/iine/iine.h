@@ -280,8 +280,9 @@ typedef struct iine_maps {
   size_t struct_size;
   /**
    * Depth change indication map (the paper's C): 1 at a depth change, else 0. With IINE_SEMANTICS_PCL both pixels of a
-   * change are marked, and those at and beside a z that is not finite; with IINE_SEMANTICS_PAPER the pixel before the
-   * change (Eq. 7), and missing points are none.
+   * change are marked, and those at and beside a z that is not finite, but two of the last row or column are never told
+   * apart, as in PCL; with IINE_SEMANTICS_PAPER the pixel before the change (Eq. 7): of missing points only the last one
+   * before a change across them.
    */
   uint8_t *depth_changes;
   /**

@@ -128,8 +128,9 @@ pub struct iine_maps {
     /// `sizeof(iine_maps)`.
     pub struct_size: usize,
     /// Depth change indication map (the paper's C): 1 at a depth change, else 0. With IINE_SEMANTICS_PCL both pixels of a
-    /// change are marked, and those at and beside a z that is not finite; with IINE_SEMANTICS_PAPER the pixel before the
-    /// change (Eq. 7), and missing points are none.
+    /// change are marked, and those at and beside a z that is not finite, but two of the last row or column are never told
+    /// apart, as in PCL; with IINE_SEMANTICS_PAPER the pixel before the change (Eq. 7): of missing points only the last one
+    /// before a change across them.
     pub depth_changes: *mut u8,
     /// Distance in pixels to the nearest depth change (the paper's T; PCL's `getDistanceMap`). Without any in the image:
     /// width + height, with IINE_SEMANTICS_PAPER infinity.

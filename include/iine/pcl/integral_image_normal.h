@@ -205,8 +205,8 @@ namespace iine
         options_.normal_estimation_method = normal_estimation_method;
       }
 
-      /** \brief Set whether a tenth of a pixel's z is added to its smoothing size.
-        * \param[in] use_depth_dependent_smoothing whether it is
+      /** \brief Set whether a tenth of a pixel's z (signed, in the cloud's unit) is added to its smoothing size.
+        * \param[in] use_depth_dependent_smoothing whether it is; default false
         */
       void
       setDepthDependentSmoothing (bool use_depth_dependent_smoothing)
@@ -266,8 +266,9 @@ namespace iine
         * compute. They are those of the smoothing area map's own windows, whatever \ref setOneSidedWindows and
         * \ref setCreaseWindows say.
         * \param[out] map width * height values, row by row: 1 at a depth change, else 0. With SEMANTICS_PCL both pixels of a
-        * change are marked, and those at and beside a z that is not finite; with SEMANTICS_PAPER the pixel before the change
-        * (Eq. 7), and missing points are none
+        * change are marked, and those at and beside a z that is not finite, but two of the last row or column are never told
+        * apart, as in PCL; with SEMANTICS_PAPER the pixel before the change (Eq. 7): of missing points only the last one
+        * before a change across them
         * \return whether it was computed; if not (unless there was a compute since \ref setInputCloud, and the last one
         * succeeded), the map is empty and an error is printed
         */
