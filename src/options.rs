@@ -237,7 +237,11 @@ impl Options {
     /// The most worker threads that can be asked for.
     pub(crate) const MOST_THREADS: usize = 1024;
 
-    /// Refuses what [`Estimator::compute`](crate::Estimator::compute) could not honour.
+    /// Refuses what [`Estimator::compute`](crate::Estimator::compute) could not honour. Looks at `paper` with
+    /// [`Semantics::Paper`], one-sided or crease windows only, and at the smoothing size with [`Semantics::Pcl`] only.
+    ///
+    /// Errors: [`Error::OptionValue`] for a number out of its range, [`Error::Unsupported`] for [`Method::Simple3DGradient`]
+    /// with [`BorderPolicy::Mirror`] or [`Semantics::Paper`].
     pub fn check(&self) -> Result<(), Error> {
         if self.threads > Self::MOST_THREADS {
             return Err(Error::OptionValue);

@@ -23,6 +23,37 @@ fn defaults_are_as_documented() {
     assert_eq!((paper.distance_metric, paper.depth), (DistanceMetric::Euclidean, Depth::Z));
 }
 
+/// As `Options::check` says.
+#[test]
+fn what_has_no_effect_is_not_checked() {
+    for semantics in Semantics::ALL {
+        for [one_sided, creases] in [[false, false], [true, false], [false, true]] {
+            let mut options = Options::default();
+            options.semantics = semantics;
+            [options.one_sided_windows, options.crease_windows] = [one_sided, creases];
+            assert_eq!(options.check(), Ok(()));
+            let takes_paper = semantics == Semantics::Paper || one_sided || creases;
+            let refused =
+                |is_looked_at| if is_looked_at { Err(Error::OptionValue) } else { Ok(()) };
+
+            let mut no_beta = options.clone();
+            no_beta.paper.beta = f32::NAN;
+            assert_eq!(no_beta.check(), refused(takes_paper), "{no_beta:?}");
+            let mut no_size = options.clone();
+            no_size.normal_smoothing_size = f32::NAN;
+            assert_eq!(no_size.check(), refused(semantics == Semantics::Pcl), "{no_size:?}");
+            options.threads = 1025;
+            assert_eq!(options.check(), Err(Error::OptionValue));
+        }
+        let mut simple = Options::default();
+        (simple.method, simple.semantics) = (Method::Simple3DGradient, semantics);
+        let is_supported = semantics == Semantics::Pcl;
+        assert_eq!(simple.check(), if is_supported { Ok(()) } else { Err(Error::Unsupported) });
+        simple.border_policy = BorderPolicy::Mirror;
+        assert_eq!(simple.check(), Err(Error::Unsupported));
+    }
+}
+
 #[test]
 fn errors_say_what_is_wrong() {
     let words = [
