@@ -123,8 +123,9 @@ namespace iine
 
       /** \brief Set the window of \ref computePointNormal and \ref computePointNormalMirror. It has no effect on
         * compute, which chooses a window for every pixel; nor does compute change it.
-        * \param[in] width the width in pixels
-        * \param[in] height the height in pixels
+        * \param[in] width the width in pixels, 0 or above; default 0, which gives NaN. These two refuse less: NaN,
+        * a printed error and a status
+        * \param[in] height the height in pixels, likewise
         */
       void
       setRectSize (const int width, const int height)
