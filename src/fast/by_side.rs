@@ -5,7 +5,7 @@ use super::depth::Depth;
 use super::half_windows::{HalfWindows, Tangents};
 use super::lanes::all;
 use super::pair::{Pair, contains};
-use super::planes::{Frame, Planes};
+use super::planes::Planes;
 use super::run::OfRun;
 use super::tile::Tile;
 use crate::simd::{GROUP, Groups, Simd};
@@ -18,7 +18,6 @@ use crate::simd::{GROUP, Groups, Simd};
 pub(crate) unsafe fn note<S: Groups, T: Depth>(
     sums: &HalfWindows<T>,
     tile: &Tile,
-    frame: &Frame,
     planes: &Planes,
     pair: &Pair,
     run: &mut OfRun<f32, 6>,
@@ -27,14 +26,14 @@ pub(crate) unsafe fn note<S: Groups, T: Depth>(
     // SAFETY: as the caller's; the frame holds the largest side around every pixel of the tile.
     unsafe {
         if let Some(side) = pair.one_side::<S>(pair.windows) {
-            let both = sums.of_pixels::<S::Pair>(frame, planes, pair.x, side);
+            let both = sums.of_pixels::<S::Pair>(planes, pair.x, side);
             note_lanes::<S::Pair>(both, run, at);
             return 0;
         }
         let [first, second] = [Group::<S>::new(pair, 0), Group::new(pair, GROUP)];
-        let (of8, plain) = first.sum_up(sums, tile, frame, planes);
+        let (of8, plain) = first.sum_up(sums, tile, planes);
         note_lanes::<S>(of8, run, at);
-        let (of8, more_plain) = second.sum_up(sums, tile, frame, planes);
+        let (of8, more_plain) = second.sum_up(sums, tile, planes);
         note_lanes::<S>(of8, run, at + GROUP);
         plain | more_plain << GROUP
     }
@@ -98,7 +97,6 @@ impl<'a, S: Groups> Group<'a, S> {
         &self,
         sums: &HalfWindows<T>,
         tile: &Tile,
-        frame: &Frame,
         planes: &Planes,
     ) -> (Tangents<Floats<S>>, u32) {
         let (mut plain, mut todo) = (0, self.windows);
@@ -110,20 +108,20 @@ impl<'a, S: Groups> Group<'a, S> {
             let (same, side) = self.next_windows(todo);
             todo &= !same;
             let mut of8 = if self.is_inside(tile, same, side) {
-                sums.of_pixels::<S>(frame, planes, self.x, side)
+                sums.of_pixels::<S>(planes, self.x, side)
             } else {
                 let mut of8 = none();
-                plain |= self.put_crossing(sums, tile, frame, planes, same, side, &mut of8);
+                plain |= self.put_crossing(sums, tile, planes, same, side, &mut of8);
                 of8
             };
             while todo != 0 {
                 let (same, side) = self.next_windows(todo);
                 todo &= !same;
                 if self.is_inside(tile, same, side) {
-                    let these = sums.of_pixels::<S>(frame, planes, self.x, side);
+                    let these = sums.of_pixels::<S>(planes, self.x, side);
                     take(&mut of8, same, these);
                 } else {
-                    plain |= self.put_crossing(sums, tile, frame, planes, same, side, &mut of8);
+                    plain |= self.put_crossing(sums, tile, planes, same, side, &mut of8);
                 }
             }
             (of8, plain)
@@ -146,18 +144,16 @@ impl<'a, S: Groups> Group<'a, S> {
     /// # Safety
     /// As [`note`].
     #[inline(always)]
-    #[allow(clippy::too_many_arguments)]
     unsafe fn put_crossing<T: Depth>(
         &self,
         sums: &HalfWindows<T>,
         tile: &Tile,
-        frame: &Frame,
         planes: &Planes,
         lanes: u32,
         side: usize,
         of8: &mut Tangents<Floats<S>>,
     ) -> u32 {
-        let ones = self.crossing(sums, tile, frame, planes, lanes, side);
+        let ones = self.crossing(sums, tile, planes, lanes, side);
         let mut plain = lanes;
         for (lane, one) in ones.into_iter().enumerate() {
             if let Some(one) = one {
@@ -181,7 +177,6 @@ impl<'a, S: Groups> Group<'a, S> {
         &self,
         sums: &HalfWindows<T>,
         tile: &Tile,
-        frame: &Frame,
         planes: &Planes,
         lanes: u32,
         side: usize,
@@ -192,7 +187,7 @@ impl<'a, S: Groups> Group<'a, S> {
             if lanes >> lane & 1 == 0 || !tile.has_only_finite(pixel, self.row[pixel.0] as usize) {
                 return None;
             }
-            sums.of_mirrored(frame, planes, tile.image, pixel, side)
+            sums.of_mirrored(planes, tile.image, pixel, side)
         })
     }
 }

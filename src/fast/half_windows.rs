@@ -119,11 +119,11 @@ impl<T: Depth> HalfWindows<T> {
     #[inline(always)]
     pub unsafe fn of_pixels<S: Simd>(
         &self,
-        frame: &Frame,
         planes: &Planes,
         x: usize,
         side: usize,
     ) -> Tangents<Floats<S>> {
+        let frame = &planes.frame;
         let (half, quarter) = (side / 2, side / 4);
         let Places { beside, outer, ends, share } = &self.places[half];
         let x = frame.column(x);
@@ -167,18 +167,18 @@ impl<T: Depth> HalfWindows<T> {
     /// Those of a window that crosses the border of the image and is mirrored there; none if it is left to the plain form.
     pub fn of_mirrored(
         &self,
-        frame: &Frame,
         planes: &Planes,
         image: &Image,
         (x, y): (usize, usize),
         side: usize,
     ) -> Option<Tangents<f32>> {
+        let frame = &planes.frame;
         let (half, quarter) = (side / 2, (side / 4) as isize);
         if half == 1 {
             return None; // floats decide there
         }
         let scale = f64::from(self.scale);
-        let own = T::of_one(planes.row(frame, 2, y)[frame.column(x)] * self.scale);
+        let own = T::of_one(planes.row(2, y)[frame.column(x)] * self.scale);
         let (x, y) = (x as isize, y as isize);
         let mean = |start: (isize, isize)| {
             let (mut sum, mut count) = (T::default(), 0_i32);
@@ -195,7 +195,7 @@ impl<T: Depth> HalfWindows<T> {
         let down = mean((x - quarter, y + 1))?;
         let point = |x, y| {
             let (x, y) = image.pixel(x, y);
-            [0, 1].map(|c| planes.row(frame, c, y)[frame.column(x)])
+            [0, 1].map(|c| planes.row(c, y)[frame.column(x)])
         };
         let difference = |a: [f32; 2], b: [f32; 2], z| [a[0] - b[0], a[1] - b[1], z];
         let horizontal = [point(x + quarter + 1, y), point(x - quarter - 1, y)];
@@ -235,12 +235,13 @@ impl<T: Depth> Sums for HalfWindows<T> {
     }
 
     #[inline(always)]
-    unsafe fn push<S: Groups>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
+    unsafe fn push<S: Groups>(&mut self, planes: &Planes, y: usize) {
+        let frame = &planes.frame;
         let place = frame.place(y);
         let (steps, lanes) = (frame.steps::<T::Along<S>>(), <T::Along<S> as Simd>::LANES);
         assert!(MARGIN + steps * lanes <= frame.stride);
         assert!(frame.start_of(1, frame.ring + 1) <= self.integrals.len());
-        let z = planes.row(frame, 2, y).as_ptr();
+        let z = planes.row(2, y).as_ptr();
         let integrals = self.integrals.as_mut_ptr();
         // SAFETY: as the caller's; the lanes lie inside the row of the ring, as was just checked.
         unsafe {
@@ -272,14 +273,13 @@ impl<T: Depth> Sums for HalfWindows<T> {
     unsafe fn note<S: Groups>(
         &self,
         tile: &Tile,
-        frame: &Frame,
         planes: &Planes,
         pair: &Pair,
         run: &mut Self::OfRun,
         at: usize,
     ) -> u32 {
         // SAFETY: as the caller's.
-        unsafe { by_side::note::<S, T>(self, tile, frame, planes, pair, run, at) }
+        unsafe { by_side::note::<S, T>(self, tile, planes, pair, run, at) }
     }
 
     #[inline(always)]

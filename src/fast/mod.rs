@@ -107,8 +107,6 @@ struct WorkerScratch {
 /// What a tile needs.
 #[derive(Debug, Default)]
 struct TileScratch {
-    /// Not a local variable of the tile's loops: it would take registers from them.
-    frame: Frame,
     planes: Planes,
     moments: Moments,
     strip_pairs: StripPairs,
@@ -231,7 +229,7 @@ pub(crate) fn compute_left(
     let sink = Sink::new(normals, indices, width, listed)?;
     let done = workers.try_share(cells.tiles(), |worker, tiles| {
         let sums = &mut lock(&each[worker]).sums;
-        sums.frame = Frame::default();
+        sums.planes.frame = Frame::default();
         for ((columns, rows), side) in tiles.filter_map(|tile| part(tile, left, row)) {
             let side = side as usize;
             let reach = side + 2;
@@ -286,7 +284,7 @@ fn compute_slices(
     for scratch in &each[..workers.count()] {
         let WorkerScratch { windows, sums, .. } = &mut *lock(scratch);
         windows.start(points, options, job.row(per_slice), expected)?;
-        sums.frame = Frame::default();
+        sums.planes.frame = Frame::default();
         // Without an output too: after the second pass there may be one, or with the next frame.
         sums.reserve(&job, true, columns, side)?;
     }
@@ -449,34 +447,27 @@ impl<'a> PclJob<'a> {
                 sides,
                 left,
             };
-            let TileScratch { frame, planes, moments, strip_pairs, strips, .. } = scratch;
+            let TileScratch { planes, moments, strip_pairs, strips, .. } = scratch;
             let TileScratch { half_windows, integer_half_windows, .. } = scratch;
             match (options.method, scale) {
-                (Method::CovarianceMatrix, _) => self.tile(tile, frame, planes, moments, sink),
-                (Method::Average3DGradient, _) => self.tile(tile, frame, planes, strip_pairs, sink),
+                (Method::CovarianceMatrix, _) => self.tile(tile, planes, moments, sink),
+                (Method::Average3DGradient, _) => self.tile(tile, planes, strip_pairs, sink),
                 (Method::AverageDepthChange, Some(scale)) => {
-                    self.tile(tile, frame, planes, integer_half_windows.scaled(scale), sink);
+                    self.tile(tile, planes, integer_half_windows.scaled(scale), sink);
                 }
                 (Method::AverageDepthChange, None) => {
-                    self.tile(tile, frame, planes, half_windows.scaled(1.0), sink);
+                    self.tile(tile, planes, half_windows.scaled(1.0), sink);
                 }
-                (Method::Simple3DGradient, _) => self.tile(tile, frame, planes, strips, sink),
+                (Method::Simple3DGradient, _) => self.tile(tile, planes, strips, sink),
             }
         }
         Ok(())
     }
 
     /// The normals of one tile.
-    fn tile<M: Sums>(
-        &self,
-        tile: &Tile,
-        frame: &mut Frame,
-        planes: &mut Planes,
-        sums: &mut M,
-        sink: &Sink,
-    ) {
+    fn tile<M: Sums>(&self, tile: &Tile, planes: &mut Planes, sums: &mut M, sink: &Sink) {
         // SAFETY: the processor has the instruction set of the job, and tiles do not share pixels.
-        unsafe { paths::run(self.job.isa, TileTask { tile, frame, planes, sums, sink }) };
+        unsafe { paths::run(self.job.isa, TileTask { tile, planes, sums, sink }) };
     }
 
     /// How many times as deep as the nearest points others may be for the method's sums, of integers or not, to be fine
@@ -529,7 +520,6 @@ impl Task for SweepTask<'_> {
 /// One tile, with the sums of its method; no one else writes the tile's pixels.
 struct TileTask<'a, M> {
     tile: &'a Tile<'a>,
-    frame: &'a mut Frame,
     planes: &'a mut Planes,
     sums: &'a mut M,
     sink: &'a Sink<'a>,
@@ -540,8 +530,8 @@ impl<M: Sums> Task for TileTask<'_, M> {
 
     #[inline(always)]
     unsafe fn run<S: Groups>(self) {
-        let TileTask { tile, frame, planes, sums, sink } = self;
+        let TileTask { tile, planes, sums, sink } = self;
         // SAFETY: as the caller's.
-        unsafe { tile.compute::<S, M>(frame, planes, sums, sink) };
+        unsafe { tile.compute::<S, M>(planes, sums, sink) };
     }
 }

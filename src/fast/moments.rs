@@ -203,14 +203,15 @@ impl Sums for Moments {
     }
 
     #[inline(always)]
-    unsafe fn push<S: Groups>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
+    unsafe fn push<S: Groups>(&mut self, planes: &Planes, y: usize) {
+        let frame = &planes.frame;
         let place = frame.place(y);
         let groups = frame.steps::<S>();
         assert!(MARGIN + groups * GROUP <= frame.stride);
         let rows = frame.start_of(1, frame.ring + 1);
         let (most, z) = (self.most[..rows].as_mut_ptr(), self.z[..rows].as_mut_ptr());
         let (above, own) = (frame.start_of(1, self.pushed), frame.start_of(1, place));
-        let planes = planes.rows(frame, y);
+        let planes = planes.rows(y);
         // SAFETY: as the caller's; the groups lie inside the planes and the rings' rows, as was just checked.
         unsafe {
             most.add(own + MARGIN - 1).write([0.0; GROUP]);
@@ -263,8 +264,7 @@ impl Sums for Moments {
     unsafe fn note<S: Groups>(
         &self,
         tile: &Tile,
-        frame: &Frame,
-        _planes: &Planes,
+        Planes { frame, .. }: &Planes,
         pair: &Pair,
         run: &mut Matrices,
         at: usize,

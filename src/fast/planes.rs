@@ -124,6 +124,8 @@ pub(crate) fn window_reach(side: usize) -> (usize, usize) {
 /// filler of [`Planes::push`]: sums along rows and columns hold it, but no window does.
 #[derive(Debug, Default)]
 pub(crate) struct Planes {
+    /// Where rows lie here, and in the rings of what is made from them.
+    pub frame: Frame,
     data: Buffer<f32>,
     /// Of the points that were read.
     pub incomplete: Incomplete,
@@ -148,15 +150,15 @@ impl Planes {
 
     /// Row `y`'s plane of coordinate `c`.
     #[inline(always)]
-    pub fn row(&self, frame: &Frame, c: usize, y: usize) -> &[f32] {
-        let start = frame.start(3, y) + c * frame.stride;
-        &self.data[start..start + frame.stride]
+    pub fn row(&self, c: usize, y: usize) -> &[f32] {
+        let start = self.frame.start(3, y) + c * self.frame.stride;
+        &self.data[start..start + self.frame.stride]
     }
 
     /// Row `y`'s planes.
     #[inline(always)]
-    pub fn rows(&self, frame: &Frame, y: usize) -> [&[f32]; 3] {
-        [self.row(frame, 0, y), self.row(frame, 1, y), self.row(frame, 2, y)]
+    pub fn rows(&self, y: usize) -> [&[f32]; 3] {
+        [self.row(0, y), self.row(1, y), self.row(2, y)]
     }
 
     /// Reads row `y` of the points, with `filler` for missing ones and those whose depths' magnitudes are not between
@@ -168,13 +170,13 @@ impl Planes {
     pub unsafe fn push<S: Along>(
         &mut self,
         points: &Points,
-        frame: &Frame,
         y: usize,
         held: [f32; 2],
         filler: [f32; 3],
     ) -> f32 {
+        let Planes { frame, data, .. } = self;
         let start = frame.start(3, y);
-        let row = &mut self.data[start..start + 3 * frame.stride];
+        let row = &mut data[start..start + 3 * frame.stride];
         assert!(MARGIN + frame.steps::<S>() * S::LANES <= frame.stride);
         let points_of_row = points.row(y, frame.columns.clone());
         let xs = row[MARGIN..].as_mut_ptr();

@@ -9,7 +9,7 @@ use super::lanes::{Bits, LANES, all};
 use super::layers::Layer;
 use super::one_point::of_one_point;
 use super::pair::Pair;
-use super::planes::{Frame, Planes};
+use super::planes::Planes;
 use super::run::{Noted, RUN};
 use super::sink::Sink;
 use super::tile::{Sums, Tile};
@@ -21,7 +21,6 @@ pub(super) struct Row<'a, M: Sums> {
     pub tile: &'a Tile<'a>,
     pub layer: &'a Layer,
     pub y: usize,
-    pub frame: &'a Frame,
     pub planes: &'a Planes,
     pub sums: &'a M,
     pub sink: &'a Sink<'a>,
@@ -39,7 +38,7 @@ impl<M: Sums> Row<'_, M> {
         inner: &Range<usize>,
         incomplete: bool,
     ) {
-        let &Row { tile, layer, y, frame, planes, sums, sink } = self;
+        let &Row { tile, layer, y, planes, sums, sink } = self;
         let row = tile.sides.row(y);
         for start in tile.columns.clone().step_by(RUN) {
             run.length = 0;
@@ -55,7 +54,7 @@ impl<M: Sums> Row<'_, M> {
                     let windows = pair.windows;
                     let mut plain = 0;
                     if incomplete {
-                        plain = planes.incomplete.in_windows(frame, &pair);
+                        plain = planes.incomplete.in_windows(&planes.frame, &pair);
                         pair.windows &= !plain;
                     }
                     if windows == 0 {
@@ -64,7 +63,7 @@ impl<M: Sums> Row<'_, M> {
                     }
                     let at = run.length * LANES;
                     if pair.windows != 0 {
-                        plain |= sums.note::<S>(tile, frame, planes, &pair, &mut run.sums, at);
+                        plain |= sums.note::<S>(tile, planes, &pair, &mut run.sums, at);
                     }
                     run.places[run.length] = (x, windows, written);
                     run.lanes[run.length] = windows & !plain;
@@ -83,7 +82,7 @@ impl<M: Sums> Row<'_, M> {
     #[inline(always)]
     unsafe fn finish<S: Groups>(&self, run: &mut Run<M>) {
         let &Row { tile, y, sums, sink, .. } = self;
-        let (row, points) = (tile.sides.row(y), self.planes.rows(self.frame, y));
+        let (row, points) = (tile.sides.row(y), self.planes.rows(y));
         let (mut rest, mut any_rest) = ([0; RUN / LANES], 0);
         // SAFETY: as the caller's; the rows are readable up to a whole pair of groups.
         unsafe {
@@ -142,7 +141,7 @@ impl<M: Sums> Row<'_, M> {
                 });
             }
             let plain = rest & !lanes | doubtful;
-            let points = self.planes.rows(self.frame, y);
+            let points = self.planes.rows(y);
             let mut normals = self.turned::<S>(found, x, rest & !of_one & !plain, points);
             let curvature = if M::CURVATURE { 0.0 } else { f32::NAN };
             for lane in Bits(of_one) {
@@ -167,7 +166,7 @@ impl<M: Sums> Row<'_, M> {
         lanes: u32,
         [xs, ys, zs]: [&[f32]; 3],
     ) -> Estimates {
-        let column = self.frame.column(x);
+        let column = self.planes.frame.column(x);
         // SAFETY: as the caller's; the rows are readable up to a whole pair of groups.
         unsafe {
             let point = [

@@ -38,7 +38,8 @@ impl StripPairs {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn push_row<S: Along>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
+    unsafe fn push_row<S: Along>(&mut self, planes: &Planes, y: usize) {
+        let frame = &planes.frame;
         std::mem::swap(&mut self.last, &mut self.above);
         let steps = frame.steps::<S>();
         assert!(MARGIN + steps * S::LANES <= frame.stride);
@@ -50,7 +51,7 @@ impl StripPairs {
         // SAFETY: as the caller's; all lanes lie inside the rows, whose lengths were just checked.
         unsafe {
             for c in 0..3 {
-                let from = planes.row(frame, c, y).as_ptr();
+                let from = planes.row(c, y).as_ptr();
                 for step in 0..steps {
                     let at = MARGIN + step * S::LANES;
                     let point = self.scale.integers::<S>(c, S::load(from.add(at)));
@@ -149,9 +150,9 @@ impl Sums for StripPairs {
     }
 
     #[inline(always)]
-    unsafe fn push<S: Groups>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
+    unsafe fn push<S: Groups>(&mut self, planes: &Planes, y: usize) {
         // SAFETY: as the caller's.
-        unsafe { self.push_row::<S::Widest>(frame, planes, y) };
+        unsafe { self.push_row::<S::Widest>(planes, y) };
     }
 
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
@@ -168,8 +169,7 @@ impl Sums for StripPairs {
     unsafe fn note<S: Groups>(
         &self,
         tile: &Tile,
-        frame: &Frame,
-        _planes: &Planes,
+        Planes { frame, .. }: &Planes,
         pair: &Pair,
         run: &mut Gradients,
         at: usize,

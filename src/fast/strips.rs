@@ -37,11 +37,12 @@ impl Strips {
     /// # Safety
     /// The processor has the instruction set of `S`.
     #[inline(always)]
-    unsafe fn push_row<S: Along>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
+    unsafe fn push_row<S: Along>(&mut self, planes: &Planes, y: usize) {
+        let frame = &planes.frame;
         let steps = frame.steps::<S>();
         assert!(MARGIN + steps * S::LANES <= frame.stride);
         let columns = self.columns[..3 * frame.stride].as_mut_ptr();
-        let points = planes.rows(frame, y).map(<[f32]>::as_ptr);
+        let points = planes.rows(y).map(<[f32]>::as_ptr);
         let done = frame.start(1, y.wrapping_sub(1));
         let ring = self.ring[done..done + frame.stride].as_mut_ptr().cast::<i32>();
         // SAFETY: as the caller's; all lanes lie inside the rows, whose lengths were just checked.
@@ -168,9 +169,9 @@ impl Sums for Strips {
     }
 
     #[inline(always)]
-    unsafe fn push<S: Groups>(&mut self, frame: &Frame, planes: &Planes, y: usize) {
+    unsafe fn push<S: Groups>(&mut self, planes: &Planes, y: usize) {
         // SAFETY: as the caller's.
-        unsafe { self.push_row::<S::Widest>(frame, planes, y) };
+        unsafe { self.push_row::<S::Widest>(planes, y) };
     }
 
     fn aim(&mut self, frame: &Frame, y: usize, side: usize) {
@@ -187,8 +188,7 @@ impl Sums for Strips {
     unsafe fn note<S: Groups>(
         &self,
         tile: &Tile,
-        frame: &Frame,
-        _planes: &Planes,
+        Planes { frame, .. }: &Planes,
         pair: &Pair,
         run: &mut Gradients,
         at: usize,

@@ -65,7 +65,7 @@ pub(crate) trait Sums {
     ///
     /// # Safety
     /// The processor has the instruction set of `S`.
-    unsafe fn push<S: Groups>(&mut self, frame: &Frame, planes: &Planes, y: usize);
+    unsafe fn push<S: Groups>(&mut self, planes: &Planes, y: usize);
 
     /// Finds where in the rings the corners of windows of up to `side` around the pixels of row `y` are: groups ask
     /// for the same ones again and again.
@@ -79,7 +79,6 @@ pub(crate) trait Sums {
     unsafe fn note<S: Groups>(
         &self,
         tile: &Tile,
-        frame: &Frame,
         planes: &Planes,
         pair: &Pair,
         run: &mut Self::OfRun,
@@ -143,7 +142,6 @@ impl Tile<'_> {
     #[inline(always)]
     pub unsafe fn compute<S: Groups, M: Sums>(
         &self,
-        frame: &mut Frame,
         planes: &mut Planes,
         sums: &mut M,
         sink: &Sink,
@@ -154,7 +152,7 @@ impl Tile<'_> {
         }
         let size = (self.image.width, self.image.height);
         // What the rings hold, if sums can go on from there.
-        let above = mem::take(frame);
+        let above = mem::take(&mut planes.frame);
         let can_go_on = M::EXACT && self.layers.len() == 1;
         for layer in self.layers {
             let Some(origin) = self.origin(layer) else {
@@ -165,34 +163,34 @@ impl Tile<'_> {
                 continue;
             };
             let side = layer.side;
-            *frame = Frame::around(&self.columns, &self.rows, side, size);
+            planes.frame = Frame::around(&self.columns, &self.rows, side, size);
             // Seldom is a point farther from the camera's axis than the deepest one from the camera.
             let first = if M::LIMITED { [0.0; 3] } else { origin };
-            let goes_on = can_go_on && frame.goes_on(&above);
+            let goes_on = can_go_on && planes.frame.goes_on(&above);
             let goes_on = goes_on && sums.goes_on(layer.deepest, side, first);
             if !goes_on {
-                sums.start(frame, layer.deepest, side, first);
+                sums.start(&planes.frame, layer.deepest, side, first);
             }
-            let mut next = if goes_on { above.rows.end } else { frame.rows.start };
+            let mut next = if goes_on { above.rows.end } else { planes.frame.rows.start };
             let mut limit = sums.limit();
             loop {
                 let pass = Pass { layer, origin, limit, next };
                 // SAFETY: as the caller's.
-                let done = unsafe { self.rows::<S, M>(frame, planes, sums, sink, pass) };
+                let done = unsafe { self.rows::<S, M>(planes, sums, sink, pass) };
                 let Err(BeyondLimit) = done else { break };
                 // SAFETY: as the caller's.
-                let extent = unsafe { self.extent::<S>(frame, planes, layer, origin) };
+                let extent = unsafe { self.extent::<S>(planes, layer, origin) };
                 if extent.is_finite() {
-                    sums.start(frame, extent, side, origin);
+                    sums.start(&planes.frame, extent, side, origin);
                 } else {
                     // Floats do not hold the way from there.
-                    sums.start(frame, f32::MAX, side, [0.0; 3]);
+                    sums.start(&planes.frame, f32::MAX, side, [0.0; 3]);
                 }
-                (limit, next) = (f32::INFINITY, frame.rows.start);
+                (limit, next) = (f32::INFINITY, planes.frame.rows.start);
             }
         }
         if !can_go_on {
-            *frame = Frame::default();
+            planes.frame = Frame::default();
         }
     }
 
@@ -234,7 +232,6 @@ impl Tile<'_> {
     #[inline(always)]
     unsafe fn extent<S: Groups>(
         &self,
-        frame: &Frame,
         planes: &mut Planes,
         layer: &Layer,
         origin: [f32; 3],
@@ -242,11 +239,11 @@ impl Tile<'_> {
         let (points, held) = (self.points, layer.held);
         // As bits, which are in the order of positive floats.
         let mut largest = 0;
-        for y in frame.rows.clone() {
+        for y in planes.frame.rows.clone() {
             // SAFETY: as the caller's.
-            unsafe { planes.push::<S::Widest>(points, frame, y, held, origin) };
-            for (plane, origin) in planes.rows(frame, y).into_iter().zip(origin) {
-                let row = &plane[MARGIN..MARGIN + frame.columns.len()];
+            unsafe { planes.push::<S::Widest>(points, y, held, origin) };
+            for (plane, origin) in planes.rows(y).into_iter().zip(origin) {
+                let row = &plane[MARGIN..MARGIN + planes.frame.columns.len()];
                 let bits = row.iter().map(|at| (at - origin).abs().to_bits());
                 largest = bits.fold(largest, u32::max);
             }
@@ -261,7 +258,6 @@ impl Tile<'_> {
     #[inline(always)]
     unsafe fn rows<S: Groups, M: Sums>(
         &self,
-        frame: &Frame,
         planes: &mut Planes,
         sums: &mut M,
         sink: &Sink,
@@ -271,25 +267,24 @@ impl Tile<'_> {
         let &Layer { held, side, .. } = layer;
         let mut run = Run::default();
         let (before, after) = window_reach(side);
-        if next == frame.rows.start {
+        if next == planes.frame.rows.start {
             planes.incomplete.start();
         }
         for y in self.rows.clone() {
             while next < (y + after + 1).min(self.image.height) {
                 // SAFETY: as the caller's.
-                let largest =
-                    unsafe { planes.push::<S::Widest>(self.points, frame, next, held, origin) };
+                let largest = unsafe { planes.push::<S::Widest>(self.points, next, held, origin) };
                 if largest > limit {
                     return Err(BeyondLimit);
                 }
                 // SAFETY: as the caller's.
-                unsafe { sums.push::<S>(frame, planes, next) };
+                unsafe { sums.push::<S>(planes, next) };
                 next += 1;
             }
-            sums.aim(frame, y, side);
-            let incomplete = planes.incomplete.aim(frame, y, before);
+            sums.aim(&planes.frame, y, side);
+            let incomplete = planes.incomplete.aim(&planes.frame, y, before);
             let inner = self.inner(side, y);
-            let row = Row { tile: self, layer, y, frame, planes, sums, sink };
+            let row = Row { tile: self, layer, y, planes, sums, sink };
             // SAFETY: as the caller's.
             unsafe { row.compute::<S>(&mut run, &inner, incomplete) };
         }
