@@ -5,9 +5,9 @@ use crate::cloud::{Normals, Points};
 use crate::fast::paper::FastEngine;
 use crate::fast::{self, Job, SIZES, Scratch};
 use crate::isa::Isa;
-use crate::methods::Estimate;
 use crate::options::{Method, Options, Semantics};
 use crate::orientation::turn_to_viewpoint;
+use crate::output::Output;
 use crate::paper::{Cloud, PaperMaps, SecondPass};
 use crate::plain::{Plain, PlainEngine, of_window};
 use crate::threads::Workers;
@@ -97,7 +97,7 @@ impl Estimator {
             return Err(Error::Size);
         }
         normals.check_disjoint(points)?;
-        self.compute_pixels(points, None, normals)
+        self.compute_pixels(points, Output { normals, indices: None })
     }
 
     /// Computes the normals of the pixels that `indices` lists (row * width + column, any order, repeats
@@ -123,35 +123,30 @@ impl Estimator {
             return Err(Error::Index);
         }
         normals.check_disjoint(points)?;
-        self.compute_pixels(points, Some(indices), normals)
+        self.compute_pixels(points, Output { normals, indices: Some(indices) })
     }
 
-    /// The normals of the pixels that `indices` list, or of all; everything was checked.
-    fn compute_pixels(
-        &mut self,
-        points: &Points,
-        indices: Option<&[i32]>,
-        normals: &Normals,
-    ) -> Result<(), Error> {
-        let points = &points.beside(normals);
+    /// The normals of a request that was checked.
+    fn compute_pixels(&mut self, points: &Points, output: Output) -> Result<(), Error> {
+        let points = &points.beside(output.normals);
         if !self.is_plain(points) {
             let Estimator { ref options, isa, ref mut scratch, .. } = *self;
             let job = Job { isa, points, options };
             if options.semantics == Semantics::Paper && !options.has_second_pass() {
-                return fast::paper::compute(&job, indices, normals, scratch);
+                return fast::paper::compute(&job, output, scratch);
             }
             if !options.is_beyond_pcl() {
-                return fast::compute(&job, indices, normals, scratch);
+                return fast::compute(&job, output, scratch);
             }
-            return self.compute_beyond_pcl(points, indices, normals);
+            return self.compute_beyond_pcl(points, output);
         }
         if self.options.is_beyond_pcl() {
-            return self.compute_beyond_pcl_plainly(points, indices, normals);
+            return self.compute_beyond_pcl_plainly(points, output);
         }
         let width = points.width();
         let plain = Plain::new(points, &self.options)?;
         let estimate = |pixel: usize| plain.estimate(pixel % width, pixel / width);
-        write(normals, indices, &Workers::default(), |_, pixel| Some(estimate(pixel)));
+        output.write(&Workers::default(), |_, pixel| Some(estimate(pixel)));
         Ok(())
     }
 
@@ -189,7 +184,7 @@ impl Estimator {
         let cleaned = cleaned.as_ref().map(Cloud::view);
         let found = of_window(cleaned.as_ref().unwrap_or(points), &self.options, (x, y), size);
         let found = turn_to_viewpoint(found, points.at(x, y), self.options.viewpoint);
-        write(normal, None, &Workers::default(), |_, _| Some(found));
+        Output { normals: normal, indices: None }.write(&Workers::default(), |_, _| Some(found));
         Ok(())
     }
 
@@ -258,12 +253,7 @@ impl Estimator {
     }
 
     /// As [`Estimator::compute_pixels`], by the plain form, where PCL's windows and sums alone are not what is asked for.
-    fn compute_beyond_pcl_plainly(
-        &mut self,
-        points: &Points,
-        indices: Option<&[i32]>,
-        normals: &Normals,
-    ) -> Result<(), Error> {
+    fn compute_beyond_pcl_plainly(&mut self, points: &Points, output: Output) -> Result<(), Error> {
         let Estimator { options, scratch, cloud, second_pass, .. } = self;
         scratch.prepare(options.threads)?;
         cloud.read(points, options)?;
@@ -271,58 +261,54 @@ impl Estimator {
         let workers = scratch.workers();
         let mut engine = PlainEngine { points, options, workers, sizes: Vec::new() };
         second_pass.compute(cloud, options, &mut engine)?;
-        write(normals, indices, workers, |_, at| {
+        output.write(workers, |_, at| {
             let chosen = second_pass.chosen(cloud, options, at, engine.sizes[at]);
             Some(chosen.unwrap_or_else(|| engine.own(at)))
         });
-        write_around(cloud, options, second_pass, indices, normals, workers);
+        write_around(cloud, options, second_pass, output, workers);
         Ok(())
     }
 
     /// The same, fast.
-    fn compute_beyond_pcl(
-        &mut self,
-        points: &Points,
-        indices: Option<&[i32]>,
-        normals: &Normals,
-    ) -> Result<(), Error> {
+    fn compute_beyond_pcl(&mut self, points: &Points, output: Output) -> Result<(), Error> {
         let Estimator { ref options, isa, ref mut scratch, ref mut cloud, ref mut second_pass } =
             *self;
         let job = Job { isa, points, options };
         scratch.prepare(options.threads)?;
         fast::paper::read_cloud(&job, cloud, scratch)?;
         // To all windows, a point that misses a coordinate is missing whole.
-        let points = &cloud.view().beside(normals);
+        let points = &cloud.view().beside(output.normals);
         let job = Job { points, ..job };
         // But for zeros, which are left out now, this is as PCL.
         if !options.has_second_pass() {
-            return fast::compute(&job, indices, normals, scratch);
+            return fast::compute(&job, output, scratch);
         }
         // CM's sums are those of even windows too.
         let is_along = options.is_cm_of_paper();
-        let own = is_along.then_some((indices, normals));
+        let own = is_along.then_some(output);
         second_pass.compute(cloud, options, &mut FastEngine { job, scratch, own })?;
         if !is_along {
             fast::paper::find_left(&job, second_pass.choices(), scratch)?;
             match options.semantics {
-                Semantics::Pcl => fast::compute_left(&job, indices, normals, scratch),
-                Semantics::Paper => fast::paper::compute_left(&job, indices, normals, scratch),
+                Semantics::Pcl => fast::compute_left(&job, output, scratch),
+                Semantics::Paper => fast::paper::compute_left(&job, output, scratch),
             }?;
         }
         // Of these hardly any is left: they are summed one by one.
         let of_left = is_along.then_some(points);
         let (scratch, workers, width) = (&*scratch, scratch.workers(), cloud.width);
+        let Output { normals, indices } = output;
         if indices.is_none() {
             fast::paper::write_chosen(&job, second_pass, cloud, normals, of_left, scratch);
             return Ok(());
         }
-        write(normals, indices, workers, |_, at| {
+        output.write(workers, |_, at| {
             let pixel = (at % width, at / width);
             let size = job.sizes(scratch, pixel.1)[pixel.0];
             let chosen = second_pass.chosen(cloud, options, at, size);
             chosen.or_else(|| second_pass.left(of_left?, options, pixel, size))
         });
-        write_around(cloud, options, second_pass, indices, normals, workers);
+        write_around(cloud, options, second_pass, output, workers);
         Ok(())
     }
 
@@ -337,43 +323,18 @@ impl Estimator {
     }
 }
 
-/// Writes the estimates of the pixels that `indices` list, or of all, for which there is one: `estimate` gives those of
-/// normals, by column and row, and of the pixels that they belong to.
-fn write(
-    normals: &Normals,
-    indices: Option<&[i32]>,
-    workers: &Workers,
-    estimate: impl Fn((usize, usize), usize) -> Option<Estimate> + Sync,
-) {
-    let put = |x: usize, y: usize, pixel: usize| {
-        if let Some(Estimate { normal, curvature }) = estimate((x, y), pixel) {
-            // SAFETY: there is an element for every index, or for every pixel, which falls to one thread.
-            unsafe { normals.write(x, y, normal, curvature) };
-        }
-    };
-    match indices {
-        None => workers.for_each(normals.height(), |_, y| {
-            (0..normals.width()).for_each(|x| put(x, y, y * normals.width() + x));
-        }),
-        Some(indices) => {
-            indices.iter().enumerate().for_each(|(k, index)| put(k, 0, *index as usize));
-        }
-    }
-}
-
 /// With one-sided windows writes the estimates of the pixels that have no normal, where the points around them give one.
 fn write_around(
     cloud: &Cloud,
     options: &Options,
     second_pass: &SecondPass,
-    indices: Option<&[i32]>,
-    normals: &Normals,
+    output: Output,
     workers: &Workers,
 ) {
     if options.one_sided_windows {
-        write(normals, indices, workers, |(x, y), at| {
+        output.write(workers, |(x, y), at| {
             // SAFETY: every normal has been written, and falls to one thread.
-            let has_normal = || unsafe { normals.has_normal(x, y) };
+            let has_normal = || unsafe { output.normals.has_normal(x, y) };
             second_pass.estimate_around(cloud, options, at, has_normal)
         });
     }

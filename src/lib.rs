@@ -42,6 +42,7 @@ mod memory;
 mod methods;
 mod options;
 mod orientation;
+mod output;
 mod paper;
 mod plain;
 mod rect;

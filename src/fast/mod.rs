@@ -55,10 +55,11 @@ use tiling::{Tiling, part, reached};
 use windows::{Sides, Windows, reach};
 
 use crate::Error;
-use crate::cloud::{Normals, Points};
+use crate::cloud::Points;
 use crate::isa::Isa;
 use crate::memory::bytes;
 use crate::options::{Method, Options};
+use crate::output::Output;
 use crate::paper::Marks;
 use crate::simd::{GROUP, Groups};
 use crate::threads::Workers;
@@ -199,34 +200,23 @@ struct PclJob<'a> {
     strips: usize,
 }
 
-/// The normals of the pixels that `indices` list, or of all.
-pub(crate) fn compute(
-    job: &Job,
-    indices: Option<&[i32]>,
-    normals: &Normals,
-    scratch: &mut Scratch,
-) -> Result<(), Error> {
-    let output = Some((indices, normals));
-    compute_slices(job, output, |_, _| (), scratch)
+/// The normals of a job.
+pub(crate) fn compute(job: &Job, output: Output, scratch: &mut Scratch) -> Result<(), Error> {
+    compute_slices(job, Some(output), |_, _| (), scratch)
 }
 
 /// As [`compute`], of the pixels that the second pass leaves to their own windows, the sides of which [`sides`] has found; if
 /// these are not few, of all. The job's depths have been read.
-pub(crate) fn compute_left(
-    job: &Job,
-    indices: Option<&[i32]>,
-    normals: &Normals,
-    scratch: &mut Scratch,
-) -> Result<(), Error> {
+pub(crate) fn compute_left(job: &Job, output: Output, scratch: &mut Scratch) -> Result<(), Error> {
     let size @ (width, height) = (job.points.width(), job.points.height());
     let Scratch { workers, each, listed, paper, .. } = scratch;
     let (left, sides) = (&paper.left, paper.sides(width));
     let row = |y: usize| sides.row(y);
     let Some(cells) = Tiling::cells(size, left, row, |side| side as usize / 2 + 1) else {
-        return compute(job, indices, normals, scratch);
+        return compute(job, output, scratch);
     };
     let job = PclJob::new(*job);
-    let sink = Sink::new(normals, indices, width, listed)?;
+    let sink = Sink::new(output, width, listed)?;
     let done = workers.try_share(cells.tiles(), |worker, tiles| {
         let sums = &mut lock(&each[worker]).sums;
         sums.planes.frame = Frame::default();
@@ -240,7 +230,7 @@ pub(crate) fn compute_left(
         Ok(())
     });
     if done.is_err() {
-        write_none(normals);
+        output.write_none();
     }
     done
 }
@@ -265,7 +255,7 @@ fn sides(job: &Job, scratch: &mut Scratch) -> Result<(), Error> {
 /// As [`compute`], if there is an output; gives every slice's rows and the sides of their windows to `read`.
 fn compute_slices(
     job: &Job,
-    output: Option<(Option<&[i32]>, &Normals)>,
+    output: Option<Output>,
     read: impl Fn(Range<usize>, Sides) + Sync,
     scratch: &mut Scratch,
 ) -> Result<(), Error> {
@@ -288,7 +278,7 @@ fn compute_slices(
         // Without an output too: after the second pass there may be one, or with the next frame.
         sums.reserve(&job, true, columns, side)?;
     }
-    let sink = output.map(|(indices, normals)| Sink::new(normals, indices, width, listed));
+    let sink = output.map(|output| Sink::new(output, width, listed));
     let sink = sink.transpose()?;
     let reach = AtomicUsize::new(0);
     let chunks = chunks(strips, per_slice, workers.count());
@@ -309,23 +299,13 @@ fn compute_slices(
         }
         Ok(())
     });
-    if let Some((_, normals)) = output {
+    if let Some(output) = output {
         *last_reach = reach.into_inner();
         if done.is_err() {
-            write_none(normals);
+            output.write_none();
         }
     }
     done
-}
-
-/// Writes NaN everywhere: no output is partial.
-fn write_none(normals: &Normals) {
-    for y in 0..normals.height() {
-        for x in 0..normals.width() {
-            // SAFETY: the pixel is one of the normals', and all threads are done.
-            unsafe { normals.write(x, y, [f32::NAN; 3], f32::NAN) };
-        }
-    }
 }
 
 /// How many strips an image has: two threads have as many each.

@@ -7,6 +7,7 @@ use super::lanes::{Bits, LANES, all};
 use crate::Error;
 use crate::cloud::Normals;
 use crate::memory::refill;
+use crate::output::Output;
 use crate::simd::Simd;
 
 /// The output of one computation.
@@ -23,10 +24,9 @@ pub(crate) enum Sink<'a> {
 }
 
 impl<'a> Sink<'a> {
-    /// The sink of all pixels of an image, or of those that `indices` list; `listed` is room for these.
+    /// The sink of an image's normals; `listed` is room for those that are listed.
     pub fn new(
-        normals: &'a Normals<'a>,
-        indices: Option<&[i32]>,
+        Output { normals, indices }: Output<'a>,
         width: usize,
         listed: &'a mut Vec<(u32, u32)>,
     ) -> Result<Self, Error> {

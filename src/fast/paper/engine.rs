@@ -1,14 +1,14 @@
 //! What the second pass builds on, fast.
 
 use super::even_windows::Even;
-use super::{Own, choices, depth_changes};
+use super::{choices, depth_changes};
 use crate::Error;
-use crate::cloud::Normals;
 use crate::fast::paths::{self, Task};
 use crate::fast::{Job, Parts, Scratch, lock, sides};
 use crate::memory::resize;
 use crate::methods::Estimate;
 use crate::options::{Method, Options, Semantics};
+use crate::output::Output;
 use crate::paper::{
     Asked, BLOCK, Cloud, DepthChanges, Engine, EvenWindow, EvenWindows, Marks, Windows,
 };
@@ -19,9 +19,8 @@ use crate::threads::Workers;
 pub(crate) struct FastEngine<'a> {
     pub job: Job<'a>,
     pub scratch: &'a mut Scratch,
-    /// Where the estimates of the pixels that are not concerned are written along with even windows, of all or of those that
-    /// indices list.
-    pub own: Option<(Option<&'a [i32]>, &'a Normals<'a>)>,
+    /// Where the estimates of the pixels that are not concerned are written along with even windows.
+    pub own: Option<Output<'a>>,
 }
 
 impl Engine for FastEngine<'_> {
@@ -68,7 +67,7 @@ impl Engine for FastEngine<'_> {
         let windows = Parts(found.even.as_mut_ptr());
         let estimates = Parts(found.of_even.as_mut_ptr());
         let even = Even { cloud, asked, windows, estimates };
-        let own = own.map(|(indices, normals)| Own { concerned, indices, normals });
+        let own = own.map(|output| (output, concerned));
         // CM's sums are what even windows are made from.
         let method = Method::CovarianceMatrix;
         let options = &Options { method, ..job.options.clone() };

@@ -48,6 +48,7 @@ use crate::Error;
 use crate::cloud::{Normals, Points};
 use crate::memory::{bytes, resize};
 use crate::options::{DistanceMetric, Method, Options, PaperOptions};
+use crate::output::Output;
 use crate::paper::{BLOCK, Blocks, Cloud, Marks, NO_WINDOW, PaperMaps, SecondPass, WORD, word_of};
 use crate::simd::{GROUP, Groups};
 
@@ -150,16 +151,15 @@ impl WorkerScratch {
     }
 }
 
-/// The normals of the pixels that `indices` list, or of all.
+/// The normals of a job.
 pub(crate) fn compute(
     job: &Job,
-    indices: Option<&[i32]>,
-    normals: &Normals,
+    output: Output,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
     job.depths(scratch)?;
     job.radii(scratch)?;
-    job.tiles(scratch, indices, normals, None)
+    job.tiles(scratch, output, None)
 }
 
 /// Finds the pixels that take no even window but have one of their own.
@@ -190,12 +190,11 @@ pub(crate) fn find_left(
 /// written.
 pub(crate) fn compute_left(
     job: &Job,
-    indices: Option<&[i32]>,
-    normals: &Normals,
+    output: Output,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
     let left = std::mem::take(&mut scratch.paper.left);
-    let done = job.tiles(scratch, indices, normals, Some(&left));
+    let done = job.tiles(scratch, output, Some(&left));
     scratch.paper.left = left;
     done
 }
@@ -256,15 +255,6 @@ pub(crate) fn read_cloud(
         }
     });
     Ok(())
-}
-
-/// Pixels' own normals.
-struct Own<'a> {
-    /// The pixels that are left out.
-    concerned: &'a Marks,
-    /// As [`compute`] has them.
-    indices: Option<&'a [i32]>,
-    normals: &'a Normals<'a>,
 }
 
 /// Tiles for windows that reach so far from their pixels, in rings of so many bytes a column and row.
@@ -387,14 +377,13 @@ impl Job<'_> {
     fn tiles(
         &self,
         scratch: &mut super::Scratch,
-        indices: Option<&[i32]>,
-        normals: &Normals,
+        output: Output,
         left: Option<&Marks>,
     ) -> Result<(), Error> {
         let &Job { points, options, .. } = self;
         let super::Scratch { workers, each, listed, paper, .. } = scratch;
         let (width, height, largest) = (points.width(), points.height(), paper.largest);
-        let sink = Sink::new(normals, indices, width, listed)?;
+        let sink = Sink::new(output, width, listed)?;
         let row = &|y: usize| self.row(paper, y);
         let column = column(options.method);
         let tiling = tiling(width, height, largest, column);
@@ -469,23 +458,23 @@ impl Job<'_> {
         }
     }
 
-    /// The even windows and their estimates, and if they are asked for pixels' `own` normals by CM, tile by tile; the even
-    /// windows' radii are not above `largest`. The depths have been read, and the pixels' own windows are those that
+    /// The even windows and their estimates, and if they are asked for pixels' `own` normals by CM but those of the pixels that
+    /// are marked, tile by tile; the even windows' radii are not above `largest`. The depths have been read, and the pixels' own windows are those that
     /// [`Job::radii`] has found.
     #[inline(never)]
     fn even_tiles(
         &self,
         scratch: &mut super::Scratch,
         even: &Even,
-        own: Option<Own>,
+        own: Option<(Output, &Marks)>,
         largest: usize,
     ) -> Result<(), Error> {
         let &Job { points, options, .. } = self;
         let super::Scratch { workers, each, listed, paper, .. } = scratch;
-        let written = own.as_ref().map_or(Written::All, |own| Written::AllBut(own.concerned));
+        let written = own.map_or(Written::All, |(_, concerned)| Written::AllBut(concerned));
         let largest = if own.is_some() { largest.max(paper.largest) } else { largest };
         let (width, height) = (points.width(), points.height());
-        let sink = own.map(|own| Sink::new(own.normals, own.indices, width, listed)).transpose()?;
+        let sink = own.map(|(output, _)| Sink::new(output, width, listed)).transpose()?;
         let length = row_length(width);
         let row = &|y: usize| match sink {
             Some(_) => self.row(paper, y),
