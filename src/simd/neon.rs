@@ -55,6 +55,12 @@ impl Simd for Neon {
         store_points(fields: [Self::F; 4], place: usize, first: *mut f32, step: usize) = store_points_by_lanes::<Self>;
     }
 
+    memory! {
+        f32, F, [0 1] of 4, splat = vdupq_n_f32, load = vld1q_f32, store = vst1q_f32;
+        i32, I, [0 1] of 4, splat_i = vdupq_n_s32, load_i = vld1q_s32, store_i = vst1q_s32;
+        f64, D, [0 1 2 3] of 2, splat_d = vdupq_n_f64, load_d = vld1q_f64, store_d = vst1q_f64;
+    }
+
     calls! { of 2:
         add(a: Self::F, b: Self::F) -> Self::F = vaddq_f32;
         sub(a: Self::F, b: Self::F) -> Self::F = vsubq_f32;
@@ -80,21 +86,6 @@ impl Simd for Neon {
         sqrt_d(a: Self::D) -> Self::D = vsqrtq_f64;
     }
 
-    #[inline(always)]
-    unsafe fn splat(value: f32) -> Self::F {
-        unsafe { [vdupq_n_f32(value); 2] }
-    }
-    #[inline(always)]
-    unsafe fn load(from: *const f32) -> Self::F {
-        unsafe { [vld1q_f32(from), vld1q_f32(from.add(4))] }
-    }
-    #[inline(always)]
-    unsafe fn store(to: *mut f32, value: Self::F) {
-        unsafe {
-            vst1q_f32(to, value[0]);
-            vst1q_f32(to.add(4), value[1]);
-        }
-    }
     #[inline(always)]
     unsafe fn min(a: Self::F, b: Self::F) -> Self::F {
         // Unlike Arm's own, `b` where one is NaN; so the other two.
@@ -155,46 +146,10 @@ impl Simd for Neon {
     }
 
     #[inline(always)]
-    unsafe fn load_i(from: *const i32) -> Self::I {
-        unsafe { [vld1q_s32(from), vld1q_s32(from.add(4))] }
-    }
-    #[inline(always)]
-    unsafe fn store_i(to: *mut i32, value: Self::I) {
-        unsafe {
-            vst1q_s32(to, value[0]);
-            vst1q_s32(to.add(4), value[1]);
-        }
-    }
-    #[inline(always)]
-    unsafe fn splat_i(value: i32) -> Self::I {
-        unsafe { [vdupq_n_s32(value); 2] }
-    }
-    #[inline(always)]
     unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
         unsafe { each!(2 vbslq_s32, lane_masks(lanes), yes, no) }
     }
 
-    #[inline(always)]
-    unsafe fn splat_d(value: f64) -> Self::D {
-        unsafe { [vdupq_n_f64(value); 4] }
-    }
-    #[inline(always)]
-    unsafe fn load_d(from: *const f64) -> Self::D {
-        unsafe {
-            [
-                vld1q_f64(from),
-                vld1q_f64(from.add(2)),
-                vld1q_f64(from.add(4)),
-                vld1q_f64(from.add(6)),
-            ]
-        }
-    }
-    #[inline(always)]
-    unsafe fn store_d(to: *mut f64, value: Self::D) {
-        for (i, half) in value.into_iter().enumerate() {
-            unsafe { vst1q_f64(to.add(2 * i), half) };
-        }
-    }
     #[inline(always)]
     unsafe fn max_d(a: Self::D, b: Self::D) -> Self::D {
         unsafe { each!(4 vbslq_f64, each!(4 vcgtq_f64, a, b), a, b) }

@@ -35,6 +35,28 @@ macro_rules! calls {
     };
 }
 
+/// Methods that fill, load and store each register, or group, by what does so with one `of N` lanes.
+macro_rules! memory {
+    ($($number:ident, $type:ident, [$($i:literal)+] of $lanes:expr,
+        $splat:ident = $splat_one:path, $load:ident = $load_one:path, $store:ident = $store_one:path;)*) => {
+        $(#[inline(always)]
+        unsafe fn $splat(value: $number) -> Self::$type {
+            // SAFETY: as the caller's.
+            unsafe { [$splat_one(value); [$($i),+].len()] }
+        }
+        #[inline(always)]
+        unsafe fn $load(from: *const $number) -> Self::$type {
+            // SAFETY: as the caller's.
+            unsafe { [$($load_one(from.add($lanes * $i))),+] }
+        }
+        #[inline(always)]
+        unsafe fn $store(to: *mut $number, value: Self::$type) {
+            // SAFETY: as the caller's.
+            unsafe { $($store_one(to.add($lanes * $i), value[$i]);)+ }
+        })*
+    };
+}
+
 /// What groups do with doubles in four registers of two, by what loads and stores a register, and what makes one of the first
 /// lanes of two, or of the second ones.
 macro_rules! doubles_by_twos {

@@ -16,29 +16,6 @@ macro_rules! both {
     };
 }
 
-macro_rules! memory {
-    ($($number:ident, $type:ident, $splat:ident, $load:ident, $store:ident;)*) => {
-        $(#[inline(always)]
-        unsafe fn $splat(value: $number) -> Self::$type {
-            // SAFETY: as the caller's.
-            [unsafe { S::$splat(value) }; 2]
-        }
-        #[inline(always)]
-        unsafe fn $load(from: *const $number) -> Self::$type {
-            // SAFETY: as the caller's.
-            unsafe { [S::$load(from), S::$load(from.add(GROUP))] }
-        }
-        #[inline(always)]
-        unsafe fn $store(to: *mut $number, value: Self::$type) {
-            // SAFETY: as the caller's.
-            unsafe {
-                S::$store(to, value[0]);
-                S::$store(to.add(GROUP), value[1]);
-            }
-        })*
-    };
-}
-
 impl<S: Simd> Simd for Twice<S> {
     const LANES: usize = 2 * S::LANES;
     type F = [S::F; 2];
@@ -81,9 +58,9 @@ impl<S: Simd> Simd for Twice<S> {
     }
 
     memory! {
-        f32, F, splat, load, store;
-        i32, I, splat_i, load_i, store_i;
-        f64, D, splat_d, load_d, store_d;
+        f32, F, [0 1] of GROUP, splat = S::splat, load = S::load, store = S::store;
+        i32, I, [0 1] of GROUP, splat_i = S::splat_i, load_i = S::load_i, store_i = S::store_i;
+        f64, D, [0 1] of GROUP, splat_d = S::splat_d, load_d = S::load_d, store_d = S::store_d;
     }
 
     #[inline(always)]

@@ -16,6 +16,16 @@ pub(crate) struct Sse2;
 #[derive(Clone, Copy)]
 pub(crate) struct Avx2;
 
+#[inline(always)]
+unsafe fn load_integers(from: *const i32) -> __m128i {
+    unsafe { _mm_loadu_si128(from.cast()) }
+}
+
+#[inline(always)]
+unsafe fn store_integers(to: *mut i32, value: __m128i) {
+    unsafe { _mm_storeu_si128(to.cast(), value) };
+}
+
 /// Stores the first two lanes.
 #[inline(always)]
 unsafe fn store_two(to: *mut f32, lanes: __m128) {
@@ -64,6 +74,12 @@ impl Simd for Sse2 {
         load_points(first: *const f32, step: usize) -> [Self::F; 3] = load_points_by_fours::<Self>;
     }
 
+    memory! {
+        f32, F, [0 1] of 4, splat = _mm_set1_ps, load = _mm_loadu_ps, store = _mm_storeu_ps;
+        i32, I, [0 1] of 4, splat_i = _mm_set1_epi32, load_i = load_integers, store_i = store_integers;
+        f64, D, [0 1 2 3] of 2, splat_d = _mm_set1_pd, load_d = _mm_loadu_pd, store_d = _mm_storeu_pd;
+    }
+
     calls! { of 2:
         add(a: Self::F, b: Self::F) -> Self::F = _mm_add_ps;
         sub(a: Self::F, b: Self::F) -> Self::F = _mm_sub_ps;
@@ -96,21 +112,6 @@ impl Simd for Sse2 {
     }
 
     #[inline(always)]
-    unsafe fn splat(value: f32) -> Self::F {
-        unsafe { [_mm_set1_ps(value); 2] }
-    }
-    #[inline(always)]
-    unsafe fn load(from: *const f32) -> Self::F {
-        unsafe { [_mm_loadu_ps(from), _mm_loadu_ps(from.add(4))] }
-    }
-    #[inline(always)]
-    unsafe fn store(to: *mut f32, value: Self::F) {
-        unsafe {
-            _mm_storeu_ps(to, value[0]);
-            _mm_storeu_ps(to.add(4), value[1]);
-        }
-    }
-    #[inline(always)]
     unsafe fn next_lane(a: Self::F, before: Self::F) -> Self::F {
         #[inline(always)]
         unsafe fn half(a: __m128, before: __m128) -> __m128 {
@@ -132,21 +133,6 @@ impl Simd for Sse2 {
     }
 
     #[inline(always)]
-    unsafe fn load_i(from: *const i32) -> Self::I {
-        unsafe { [_mm_loadu_si128(from.cast()), _mm_loadu_si128(from.add(4).cast())] }
-    }
-    #[inline(always)]
-    unsafe fn store_i(to: *mut i32, value: Self::I) {
-        unsafe {
-            _mm_storeu_si128(to.cast(), value[0]);
-            _mm_storeu_si128(to.add(4).cast(), value[1]);
-        }
-    }
-    #[inline(always)]
-    unsafe fn splat_i(value: i32) -> Self::I {
-        unsafe { [_mm_set1_epi32(value); 2] }
-    }
-    #[inline(always)]
     unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
         unsafe {
             let mask = Self::mask(lanes);
@@ -155,27 +141,6 @@ impl Simd for Sse2 {
         }
     }
 
-    #[inline(always)]
-    unsafe fn splat_d(value: f64) -> Self::D {
-        unsafe { [_mm_set1_pd(value); 4] }
-    }
-    #[inline(always)]
-    unsafe fn load_d(from: *const f64) -> Self::D {
-        unsafe {
-            [
-                _mm_loadu_pd(from),
-                _mm_loadu_pd(from.add(2)),
-                _mm_loadu_pd(from.add(4)),
-                _mm_loadu_pd(from.add(6)),
-            ]
-        }
-    }
-    #[inline(always)]
-    unsafe fn store_d(to: *mut f64, value: Self::D) {
-        for (i, half) in value.into_iter().enumerate() {
-            unsafe { _mm_storeu_pd(to.add(2 * i), half) };
-        }
-    }
     #[inline(always)]
     unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32 {
         let mut bits = 0;
@@ -348,6 +313,10 @@ impl Simd for Avx2 {
         load_points(first: *const f32, step: usize) -> [Self::F; 3] = load_points_by_fours::<Self>;
     }
 
+    memory! {
+        f64, D, [0 1] of 4, splat_d = _mm256_set1_pd, load_d = _mm256_loadu_pd, store_d = _mm256_storeu_pd;
+    }
+
     calls! { of 2:
         add_d(a: Self::D, b: Self::D) -> Self::D = _mm256_add_pd;
         sub_d(a: Self::D, b: Self::D) -> Self::D = _mm256_sub_pd;
@@ -401,21 +370,6 @@ impl Simd for Avx2 {
         unsafe { _mm256_blendv_epi8(no, yes, _mm256_castps_si256(Self::mask(lanes))) }
     }
 
-    #[inline(always)]
-    unsafe fn splat_d(value: f64) -> Self::D {
-        unsafe { [_mm256_set1_pd(value); 2] }
-    }
-    #[inline(always)]
-    unsafe fn load_d(from: *const f64) -> Self::D {
-        unsafe { [_mm256_loadu_pd(from), _mm256_loadu_pd(from.add(4))] }
-    }
-    #[inline(always)]
-    unsafe fn store_d(to: *mut f64, value: Self::D) {
-        unsafe {
-            _mm256_storeu_pd(to, value[0]);
-            _mm256_storeu_pd(to.add(4), value[1]);
-        }
-    }
     #[inline(always)]
     unsafe fn bits_lt_d(a: Self::D, b: Self::D) -> u32 {
         unsafe {
