@@ -2,6 +2,8 @@
 
 use std::fmt::Write;
 
+use crate::ranking::distinct;
+
 /// The scale of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Scale {
@@ -114,12 +116,8 @@ fn escape(text: &str) -> String {
 
 /// The panels, row by row in so many columns, as a whole SVG file.
 pub fn svg(panels: &[Panel], columns: usize) -> String {
-    let mut names: Vec<&str> = Vec::new();
-    for (name, _) in panels.iter().flat_map(|panel| &panel.curves) {
-        if !names.contains(&name.as_str()) {
-            names.push(name);
-        }
-    }
+    let curves = panels.iter().flat_map(|panel| &panel.curves);
+    let names = distinct(curves.map(|(name, _)| name.as_str()));
     let style = |name: &str| {
         let at = names.iter().position(|known| *known == name).expect("a known name");
         let dash = DASHES[at / COLOURS.len() % DASHES.len()];
