@@ -659,6 +659,13 @@ static void test_window(void) {
   iine_estimator_free(e);
 }
 
+static iine_maps no_maps(void) {
+  iine_maps maps;
+  memset(&maps, 0, sizeof maps);
+  maps.struct_size = sizeof maps;
+  return maps;
+}
+
 /* One refused call of compute_maps. */
 #define REFUSE_MAPS(expected, change)                                        \
   do {                                                                       \
@@ -673,11 +680,9 @@ static void test_maps(void) {
   static float distances[PIXELS + 1], areas[PIXELS + 1], untouched[PIXELS + 1], three[4 * PIXELS];
   iine_estimator *const e = new_estimator();
   const iine_points points = cloud_points();
-  iine_maps none, all, maps;
+  const iine_maps none = no_maps();
+  iine_maps all = none, maps;
   int i;
-  memset(&none, 0, sizeof none);
-  none.struct_size = sizeof none;
-  all = none;
   all.depth_changes = depth_changes;
   all.distances = distances;
   all.smoothing_areas = areas;
@@ -825,28 +830,29 @@ static void test_scratch(void) {
 /* The smoothing area map R of the paper, with all options as they are. */
 static void paper_radii(iine_estimator *e, float *to) {
   const iine_points points = cloud_points();
-  iine_maps maps;
-  memset(&maps, 0, sizeof maps);
-  maps.struct_size = sizeof maps;
+  iine_maps maps = no_maps();
   maps.smoothing_areas = to;
   STATUS(IINE_OK, iine_estimator_compute_maps(e, &points, &maps));
 }
 
-/* Every option of the paper's semantics has its effect, and one that is refused has none. */
-static void test_paper(void) {
-  static float radii[PIXELS], other[PIXELS], expected[4 * PIXELS];
+/* Pixels of the cloud: away from the step and in its corner, the missing one, and the last one before the step. */
+enum { INSIDE = 12 * WIDTH + 8, CORNER = 0, HOLE = 20 * WIDTH + 10, EDGE = 15 * WIDTH + WIDTH / 2 - 1 };
+
+/* With the paper's semantics. The plane is steep: only the step is a depth change. */
+static iine_estimator *new_paper_estimator(void) {
   iine_estimator *const e = new_estimator();
-  const iine_points points = cloud_points();
-  const iine_normals to_expected = packed_normals(expected), to_actual = packed_normals(normals_out);
-  const int inside = 12 * WIDTH + 8, corner = 0, hole = 20 * WIDTH + 10, edge = 15 * WIDTH + WIDTH / 2 - 1;
-  int32_t method;
-  int i, missing;
   STATUS(IINE_OK, iine_estimator_set_semantics(e, IINE_SEMANTICS_PAPER));
-  /* The plane is steep: only the step is a depth change. */
   STATUS(IINE_OK, iine_estimator_set_paper_gamma(e, 100.0f));
+  return e;
+}
+
+/* Every option of the paper's semantics has its effect, and one that is refused has none. */
+static void test_paper_radii(void) {
+  static float radii[PIXELS], other[PIXELS];
+  iine_estimator *const e = new_paper_estimator();
   paper_radii(e, radii);
-  CHECK(radii[inside] == 5.0f && radii[corner] == 5.0f);
-  CHECK(radii[hole] == 0.0f && radii[edge] == 0.0f);
+  CHECK(radii[INSIDE] == 5.0f && radii[CORNER] == 5.0f);
+  CHECK(radii[HOLE] == 0.0f && radii[EDGE] == 0.0f);
   STATUS(IINE_ERROR_OPTION_VALUE, iine_estimator_set_paper_alpha(e, NAN));
   STATUS(IINE_ERROR_OPTION_VALUE, iine_estimator_set_paper_beta(e, -1.0f));
   STATUS(IINE_ERROR_OPTION_VALUE, iine_estimator_set_paper_gamma(e, 0.0f));
@@ -858,107 +864,104 @@ static void test_paper(void) {
 
   STATUS(IINE_OK, iine_estimator_set_paper_beta(e, 4000.0f));
   paper_radii(e, other);
-  CHECK(other[corner] == 4000.0f * (0.0028f * cloud[corner].z * cloud[corner].z));
+  CHECK(other[CORNER] == 4000.0f * (0.0028f * cloud[CORNER].z * cloud[CORNER].z));
   STATUS(IINE_OK, iine_estimator_set_paper_alpha(e, 0.0025f));
   paper_radii(e, other);
-  CHECK(other[corner] == 4000.0f * (0.0025f * cloud[corner].z * cloud[corner].z));
+  CHECK(other[CORNER] == 4000.0f * (0.0025f * cloud[CORNER].z * cloud[CORNER].z));
   STATUS(IINE_OK, iine_estimator_set_paper_radii(e, 1, 4, 7));
   paper_radii(e, other);
-  CHECK(other[corner] == 7.0f);
+  CHECK(other[CORNER] == 7.0f);
   STATUS(IINE_OK, iine_estimator_set_paper_beta(e, 1e-3f));
   paper_radii(e, other);
-  CHECK(other[corner] == 4.0f);
+  CHECK(other[CORNER] == 4.0f);
   STATUS(IINE_OK, iine_estimator_set_paper_radii(e, 4, 4, 7));
   paper_radii(e, other);
   CHECK(other[15 * WIDTH + WIDTH / 2 - 6] == 0.0f); /* 5 px from the change, 3.5 of radius */
   STATUS(IINE_OK, iine_estimator_set_paper_radii(e, 1, 4, 7));
   STATUS(IINE_OK, iine_estimator_set_paper_gamma(e, 0.1f));
   paper_radii(e, other);
-  CHECK(other[corner] == 0.0f); /* every pixel is a change now */
-
-  /* Depth by the range is more than by z. */
+  CHECK(other[CORNER] == 0.0f); /* every pixel is a change now */
   iine_estimator_free(e);
-  {
-    iine_estimator *const f = new_estimator();
-    STATUS(IINE_OK, iine_estimator_set_semantics(f, IINE_SEMANTICS_PAPER));
-    STATUS(IINE_OK, iine_estimator_set_paper_gamma(f, 100.0f));
-    STATUS(IINE_OK, iine_estimator_set_paper_beta(f, 4000.0f));
-    paper_radii(f, radii);
-    STATUS(IINE_OK, iine_estimator_set_paper_depth(f, IINE_DEPTH_RANGE));
-    paper_radii(f, other);
-    CHECK(other[corner] > radii[corner]);
-    STATUS(IINE_OK, iine_estimator_set_paper_depth(f, IINE_DEPTH_Z));
-    STATUS(IINE_OK, iine_estimator_set_paper_distance_metric(f, IINE_DISTANCE_METRIC_CHAMFER));
-    /* The nearest depth change is two columns and one row away: 7 / 3, not the square root of 5. */
-    cloud[15 * WIDTH + 8].z -= 0.5f;
-    {
-      static float distances[PIXELS];
-      iine_maps maps;
-      memset(&maps, 0, sizeof maps);
-      maps.struct_size = sizeof maps;
-      maps.distances = distances;
-      STATUS(IINE_OK, iine_estimator_compute_maps(f, &points, &maps));
-      CHECK(distances[16 * WIDTH + 10] == 7.0f / 3.0f);
-    }
-    iine_estimator_free(f);
-  }
-  fill_cloud();
+}
 
-  /* The methods; SIMPLE_3D_GRADIENT is refused and writes nothing. */
-  {
-    iine_estimator *const f = new_estimator();
-    STATUS(IINE_OK, iine_estimator_set_semantics(f, IINE_SEMANTICS_PAPER));
-    STATUS(IINE_OK, iine_estimator_set_paper_gamma(f, 100.0f));
-    for (method = 0; method < IINE_METHOD_SIMPLE_3D_GRADIENT; ++method) {
-      STATUS(IINE_OK, iine_estimator_set_method(f, method));
-      STATUS(IINE_OK, iine_estimator_compute(f, &points, &to_expected));
-      CHECK(expected[4 * inside] > 0.97f && expected[4 * corner] > 0.97f);
-      CHECK(isnan(expected[4 * hole]) && isnan(expected[4 * edge]));
-      CHECK(isnan(expected[4 * inside + 3]) == (method != IINE_METHOD_COVARIANCE_MATRIX));
-      {
-        const int32_t indices[2] = {12 * WIDTH + 8, 0};
-        STATUS(IINE_OK, iine_estimator_compute_indices(f, &points, indices, 2, &to_actual));
-        CHECK(memcmp(normals_out, expected + 4 * inside, 4 * sizeof(float)) == 0);
-        CHECK(memcmp(normals_out + 4, expected, 4 * sizeof(float)) == 0);
-      }
-      STATUS(IINE_OK, iine_estimator_compute_window(f, &points, 8, 12, 11, 11, &to_actual));
-      for (i = 0; i < 3; ++i) {
-        CHECK(fabsf(normals_out[i] - expected[4 * inside + i]) < 1e-5f);
-      }
+static void test_paper_depth_and_metric(void) {
+  static float radii[PIXELS], other[PIXELS], distances[PIXELS];
+  iine_estimator *const e = new_paper_estimator();
+  const iine_points points = cloud_points();
+  iine_maps maps = no_maps();
+  /* Depth by the range is more than by z. */
+  STATUS(IINE_OK, iine_estimator_set_paper_beta(e, 4000.0f));
+  paper_radii(e, radii);
+  STATUS(IINE_OK, iine_estimator_set_paper_depth(e, IINE_DEPTH_RANGE));
+  paper_radii(e, other);
+  CHECK(other[CORNER] > radii[CORNER]);
+  STATUS(IINE_OK, iine_estimator_set_paper_depth(e, IINE_DEPTH_Z));
+  /* The nearest depth change is two columns and one row away: 7 / 3, not the square root of 5. */
+  STATUS(IINE_OK, iine_estimator_set_paper_distance_metric(e, IINE_DISTANCE_METRIC_CHAMFER));
+  cloud[15 * WIDTH + 8].z -= 0.5f;
+  maps.distances = distances;
+  STATUS(IINE_OK, iine_estimator_compute_maps(e, &points, &maps));
+  CHECK(distances[16 * WIDTH + 10] == 7.0f / 3.0f);
+  iine_estimator_free(e);
+}
 
-      STATUS(IINE_OK, iine_estimator_set_one_sided_windows(f, 1));
-      STATUS(IINE_OK, iine_estimator_compute(f, &points, &to_actual));
-      STATUS(IINE_OK, iine_estimator_set_one_sided_windows(f, 0));
-      for (i = 0, missing = 0; i < PIXELS; ++i) {
-        missing += isnan(normals_out[4 * i]) ? 1 : 0;
-      }
-      CHECK(missing == 1); /* the hole */
-      CHECK(normals_out[4 * edge] > 0.97f && normals_out[4 * edge + 4] > 0.9f); /* before and behind the step */
+/* SIMPLE_3D_GRADIENT is refused and writes nothing. */
+static void test_paper_methods(void) {
+  static float expected[4 * PIXELS];
+  const int32_t indices[2] = {INSIDE, CORNER};
+  iine_estimator *const e = new_paper_estimator();
+  const iine_points points = cloud_points();
+  const iine_normals to_expected = packed_normals(expected), to_actual = packed_normals(normals_out);
+  int32_t method;
+  int i, missing;
+  for (method = 0; method < IINE_METHOD_SIMPLE_3D_GRADIENT; ++method) {
+    STATUS(IINE_OK, iine_estimator_set_method(e, method));
+    STATUS(IINE_OK, iine_estimator_compute(e, &points, &to_expected));
+    CHECK(expected[4 * INSIDE] > 0.97f && expected[4 * CORNER] > 0.97f);
+    CHECK(isnan(expected[4 * HOLE]) && isnan(expected[4 * EDGE]));
+    CHECK(isnan(expected[4 * INSIDE + 3]) == (method != IINE_METHOD_COVARIANCE_MATRIX));
+    STATUS(IINE_OK, iine_estimator_compute_indices(e, &points, indices, 2, &to_actual));
+    CHECK(memcmp(normals_out, expected + 4 * INSIDE, 4 * sizeof(float)) == 0);
+    CHECK(memcmp(normals_out + 4, expected + 4 * CORNER, 4 * sizeof(float)) == 0);
+    STATUS(IINE_OK, iine_estimator_compute_window(e, &points, 8, 12, 11, 11, &to_actual));
+    for (i = 0; i < 3; ++i) {
+      CHECK(fabsf(normals_out[i] - expected[4 * INSIDE + i]) < 1e-5f);
     }
-    STATUS(IINE_OK, iine_estimator_set_method(f, IINE_METHOD_SIMPLE_3D_GRADIENT));
-    refuse(IINE_ERROR_UNSUPPORTED, f, &points, &to_actual, __LINE__);
-    STATUS(IINE_ERROR_UNSUPPORTED, iine_estimator_compute_window(f, &points, 12, 12, 5, 5, &to_actual));
-    iine_estimator_free(f);
-  }
 
-  /* Zeros are points, or missing. */
-  for (i = 0; i < PIXELS; ++i) {
-    if (isnan(cloud[i].x)) {
-      cloud[i].x = cloud[i].y = cloud[i].z = 0.0f;
+    STATUS(IINE_OK, iine_estimator_set_one_sided_windows(e, 1));
+    STATUS(IINE_OK, iine_estimator_compute(e, &points, &to_actual));
+    STATUS(IINE_OK, iine_estimator_set_one_sided_windows(e, 0));
+    for (i = 0, missing = 0; i < PIXELS; ++i) {
+      missing += isnan(normals_out[4 * i]) ? 1 : 0;
     }
+    CHECK(missing == 1); /* the hole */
+    CHECK(normals_out[4 * EDGE] > 0.97f && normals_out[4 * EDGE + 4] > 0.9f); /* before and behind the step */
   }
-  for (i = 0; i < 2; ++i) {
-    iine_estimator *const f = new_estimator();
-    STATUS(IINE_OK, iine_estimator_set_zero_is_missing(f, i));
-    STATUS(IINE_OK, iine_estimator_set_one_sided_windows(f, 1));
-    STATUS(IINE_OK, iine_estimator_compute(f, &points, &to_actual));
-    STATUS(IINE_OK, iine_estimator_set_semantics(f, IINE_SEMANTICS_PAPER));
-    STATUS(IINE_OK, iine_estimator_compute(f, &points, &to_expected));
-    CHECK(isnan(normals_out[4 * hole]) || i == 0);
-    CHECK(isnan(expected[4 * hole]) || i == 0);
-    paper_radii(f, radii);
-    CHECK(radii[hole - 1] > 0.0f || i == 0);
-    iine_estimator_free(f);
+  STATUS(IINE_OK, iine_estimator_set_method(e, IINE_METHOD_SIMPLE_3D_GRADIENT));
+  refuse(IINE_ERROR_UNSUPPORTED, e, &points, &to_actual, __LINE__);
+  STATUS(IINE_ERROR_UNSUPPORTED, iine_estimator_compute_window(e, &points, 12, 12, 5, 5, &to_actual));
+  iine_estimator_free(e);
+}
+
+/* Zeros are points, or missing. */
+static void test_zeros(void) {
+  static float radii[PIXELS], of_paper[4 * PIXELS];
+  const iine_points points = cloud_points();
+  const iine_normals to_paper = packed_normals(of_paper), to_actual = packed_normals(normals_out);
+  int are_missing;
+  cloud[HOLE].x = cloud[HOLE].y = cloud[HOLE].z = 0.0f;
+  for (are_missing = 0; are_missing < 2; ++are_missing) {
+    iine_estimator *const e = new_estimator();
+    STATUS(IINE_OK, iine_estimator_set_zero_is_missing(e, are_missing));
+    STATUS(IINE_OK, iine_estimator_set_one_sided_windows(e, 1));
+    STATUS(IINE_OK, iine_estimator_compute(e, &points, &to_actual));
+    STATUS(IINE_OK, iine_estimator_set_semantics(e, IINE_SEMANTICS_PAPER));
+    STATUS(IINE_OK, iine_estimator_compute(e, &points, &to_paper));
+    CHECK(isnan(normals_out[4 * HOLE]) || !are_missing);
+    CHECK(isnan(of_paper[4 * HOLE]) || !are_missing);
+    paper_radii(e, radii);
+    CHECK(radii[HOLE - 1] > 0.0f || !are_missing);
+    iine_estimator_free(e);
   }
 }
 
@@ -1018,7 +1021,7 @@ int main(void) {
       test_new_and_free,    test_options, test_paper_options, test_refused_options_change_nothing,
       test_compute,  test_layouts,    test_threads_do_not_change_the_result,
       test_compute_refuses, test_indices, test_window, test_maps,
-      test_paper, test_crease_windows,
+      test_paper_radii, test_paper_depth_and_metric, test_paper_methods, test_zeros, test_crease_windows,
       test_scratch,  test_small_clouds};
   size_t i;
   for (i = 0; i < sizeof tests / sizeof *tests; ++i) {
