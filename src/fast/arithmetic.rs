@@ -153,6 +153,13 @@ impl<S: Simd> Floats<S> {
         self.0 = unsafe { S::select(mask, other.0, self.0) };
     }
 
+    /// Takes another's of some lanes.
+    #[inline(always)]
+    pub fn take_lanes(&mut self, lanes: u32, other: Self) {
+        // SAFETY: there is a group, so there is the instruction set.
+        self.take(unsafe { S::mask(lanes) }, other);
+    }
+
     /// Bit l is `self < other` in lane l.
     #[inline(always)]
     pub fn lt(self, other: Self) -> u32 {
@@ -190,7 +197,7 @@ impl<S: Simd> Doubles<S> {
 
     /// Takes another's of some lanes.
     #[inline(always)]
-    pub fn take(&mut self, lanes: u32, other: Self) {
+    pub fn take_lanes(&mut self, lanes: u32, other: Self) {
         // SAFETY: there is a group, so there is the instruction set.
         self.0 = unsafe { S::select_bits_d(lanes, other.0, self.0) };
     }

@@ -1,7 +1,7 @@
 //! Windows of one size for all pixels of a group at once, as many times as a group has sizes: for AVERAGE_DEPTH_CHANGE.
 
 use super::arithmetic::Floats;
-use super::depth::Depth;
+use super::depth::DepthSum;
 use super::half_windows::{HalfWindows, Tangents};
 use super::lanes::all;
 use super::pair::{Pair, contains};
@@ -15,7 +15,7 @@ use crate::simd::{GROUP, Groups, Simd};
 /// # Safety
 /// As there.
 #[inline(always)]
-pub(crate) unsafe fn note<S: Groups, T: Depth>(
+pub(crate) unsafe fn note<S: Groups, T: DepthSum>(
     sums: &HalfWindows<T>,
     tile: &Tile,
     planes: &Planes,
@@ -93,7 +93,7 @@ impl<'a, S: Groups> Group<'a, S> {
     /// # Safety
     /// As [`note`].
     #[inline(always)]
-    unsafe fn sum_up<T: Depth>(
+    unsafe fn sum_up<T: DepthSum>(
         &self,
         sums: &HalfWindows<T>,
         tile: &Tile,
@@ -144,7 +144,7 @@ impl<'a, S: Groups> Group<'a, S> {
     /// # Safety
     /// As [`note`].
     #[inline(always)]
-    unsafe fn put_crossing<T: Depth>(
+    unsafe fn put_crossing<T: DepthSum>(
         &self,
         sums: &HalfWindows<T>,
         tile: &Tile,
@@ -173,7 +173,7 @@ impl<'a, S: Groups> Group<'a, S> {
     /// The sums of windows that cross the border of the image, but of those that are left to the plain form.
     // No instructions of `S` in here: they would not be inlined into a function of its own.
     #[cold]
-    fn crossing<T: Depth>(
+    fn crossing<T: DepthSum>(
         &self,
         sums: &HalfWindows<T>,
         tile: &Tile,

@@ -12,12 +12,12 @@ use crate::simd::{Along, Groups, Simd};
 use crate::vector::{cross, difference, dot};
 
 /// What depths are summed up in.
-pub(crate) trait Depth: Lane + Number {
+pub(crate) trait DepthSum: Lane + Number {
     /// [`Sums::EXACT`](super::tile::Sums::EXACT)
     const EXACT: bool;
 
     /// As many lanes as are added along a row at once.
-    type Along<S: Groups>: Simd;
+    type Pushed<S: Groups>: Simd;
 
     /// What rounding moves a difference between two half windows' sums by at most: where depths are multiplied by
     /// `scale`, none is larger than `limit`, and the ring holds so many. Of integers, between their means.
@@ -41,17 +41,17 @@ pub(crate) trait Depth: Lane + Number {
 
     /// The sums along the row, going on from `carry`, which becomes the last one.
     fn running_sum<S: Groups>(
-        depths: Self::Of<Self::Along<S>>,
-        carry: &mut Self::Of<Self::Along<S>>,
-    ) -> Self::Of<Self::Along<S>>;
+        depths: Self::Of<Self::Pushed<S>>,
+        carry: &mut Self::Of<Self::Pushed<S>>,
+    ) -> Self::Of<Self::Pushed<S>>;
 
     fn floats<S: Simd>(sums: Self::Of<S>) -> Floats<S>;
 }
 
-impl Depth for f64 {
+impl DepthSum for f64 {
     const EXACT: bool = false;
 
-    type Along<S: Groups> = S;
+    type Pushed<S: Groups> = S;
 
     fn error(_scale: f32, limit: f32, held: usize) -> f64 {
         2.0 * ROUNDING * f64::from(limit) * held as f64
@@ -95,10 +95,10 @@ impl Depth for f64 {
     }
 }
 
-impl Depth for i32 {
+impl DepthSum for i32 {
     const EXACT: bool = true;
 
-    type Along<S: Groups> = S::Widest;
+    type Pushed<S: Groups> = S::Widest;
 
     fn error(scale: f32, _limit: f32, _held: usize) -> f64 {
         // Equal depths, as of a sensor with depth steps, are all rounded alike.

@@ -10,9 +10,9 @@ use crate::cloud::Points;
 use crate::distance::far;
 use crate::simd::{Groups, Simd};
 
-/// What depth changes are made from, from row to row.
+/// The rows of depths that changes are between, from row to row.
 #[derive(Debug, Default)]
-pub(super) struct DepthChanges {
+pub(super) struct DepthRows {
     /// A ring of two rows of depths in lane order, each with an element more for the following segments' first pixels.
     z: Buffer<Lanes>,
     /// Masks: where the pixel's neighbours are tested, and where there is a depth change from the one above.
@@ -20,7 +20,7 @@ pub(super) struct DepthChanges {
     above: Buffer<Lanes>,
 }
 
-impl DepthChanges {
+impl DepthRows {
     /// Makes room for rows of so many pixels.
     pub fn reserve(&mut self, width: usize) -> Result<(), Error> {
         let length = LaneOrder::new(width).segment + 1;
@@ -53,7 +53,7 @@ impl DepthChanges {
     }
 
     /// The depths of row `y`, which is one of the two read last.
-    pub fn depths(&self, order: LaneOrder, y: usize) -> &[Lanes] {
+    pub fn row(&self, order: LaneOrder, y: usize) -> &[Lanes] {
         &self.z[Self::place(order, y)]
     }
 
@@ -84,7 +84,7 @@ impl DepthChanges {
     /// # Safety
     /// The processor has the instruction set of `S`, which has sixteen lanes.
     #[inline(always)]
-    pub unsafe fn find<S: Simd>(
+    pub unsafe fn find_changes<S: Simd>(
         &mut self,
         points: &Points,
         y: usize,
@@ -130,7 +130,7 @@ impl DepthChanges {
 
     /// Bytes held.
     pub fn size(&self) -> usize {
-        let DepthChanges { z, tested, above } = self;
+        let DepthRows { z, tested, above } = self;
         [z, tested, above].map(Buffer::size).into_iter().sum()
     }
 }

@@ -5,7 +5,7 @@
 use super::arithmetic::{Floats, between};
 use super::buffer::Buffer;
 use super::by_side;
-use super::depth::Depth;
+use super::depth::DepthSum;
 use super::estimates::Found;
 use super::pair::Pair;
 use super::planes::{Frame, MARGIN, Planes};
@@ -89,7 +89,7 @@ unsafe fn sum_between<S: Simd, T: Lane>(
     }
 }
 
-impl<T: Depth> HalfWindows<T> {
+impl<T: DepthSum> HalfWindows<T> {
     /// With depths multiplied so.
     pub fn scaled(&mut self, scale: f32) -> &mut Self {
         self.is_same_scale = scale == self.scale;
@@ -207,7 +207,7 @@ impl<T: Depth> HalfWindows<T> {
     }
 }
 
-impl<T: Depth> Sums for HalfWindows<T> {
+impl<T: DepthSum> Sums for HalfWindows<T> {
     type OfRun = OfRun<f32, 6>;
 
     const COLUMN: usize = size_of::<T>();
@@ -238,7 +238,7 @@ impl<T: Depth> Sums for HalfWindows<T> {
     unsafe fn push<S: Groups>(&mut self, planes: &Planes, y: usize) {
         let frame = &planes.frame;
         let place = frame.place(y);
-        let (steps, lanes) = (frame.steps::<T::Along<S>>(), <T::Along<S> as Simd>::LANES);
+        let (steps, lanes) = (frame.steps::<T::Pushed<S>>(), <T::Pushed<S> as Simd>::LANES);
         assert!(MARGIN + steps * lanes <= frame.stride);
         assert!(frame.start_of(1, frame.ring + 1) <= self.integrals.len());
         let z = planes.row(2, y).as_ptr();
@@ -249,13 +249,13 @@ impl<T: Depth> Sums for HalfWindows<T> {
             let row = integrals.add(frame.start_of(1, place));
             *row.add(MARGIN - 1) = T::default();
             let scale = Floats::splat(self.scale);
-            let mut carry = T::of::<T::Along<S>>(Floats::splat(0.0));
+            let mut carry = T::of::<T::Pushed<S>>(Floats::splat(0.0));
             for step in 0..steps {
                 let at = MARGIN + step * lanes;
-                let depths = T::of::<T::Along<S>>(Floats::load(z.add(at)) * scale);
+                let depths = T::of::<T::Pushed<S>>(Floats::load(z.add(at)) * scale);
                 let along = T::running_sum::<S>(depths, &mut carry);
-                let sums = along + T::load::<T::Along<S>>(above.add(at));
-                T::store::<T::Along<S>>(row.add(at), sums);
+                let sums = along + T::load::<T::Pushed<S>>(above.add(at));
+                T::store::<T::Pushed<S>>(row.add(at), sums);
             }
         }
         self.pushed = place;

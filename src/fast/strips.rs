@@ -132,7 +132,7 @@ impl LeftCorners for [usize; 3] {
         // SAFETY: as the caller's.
         unsafe {
             let both = sum_between::<S>(pixel, [above, horizontal], side & !1);
-            S::select_i(HORIZONTAL, both, sum_between::<S>(pixel, [above, vertical], side))
+            S::select_bits_i(HORIZONTAL, both, sum_between::<S>(pixel, [above, vertical], side))
         }
     }
 }

@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use super::buffer::Buffer;
-use super::depth_changes::DepthChanges;
+use super::depth_changes::DepthRows;
 use super::distance::{backward, close_ends, forward};
 use super::lanes::{LANES, LaneOrder, Lanes};
 use super::smoothing_area::{Smoothing, ignore, one_smoothing, sides};
@@ -95,7 +95,7 @@ impl Windows {
     ) -> Result<(), Error> {
         let (length, height) = (row_length(points.width()), points.height());
         let reach = reach(points, options, 0.0);
-        self.sweep.changes.reserve(points.width())?;
+        self.sweep.depths.reserve(points.width())?;
         self.sweep.sides.grow(LaneOrder::new(points.width()).segment)?;
         self.map.grow((rows + 2 * reach).min(height) * length)?;
         self.held.grow(reach.min(height) * length)?;
@@ -172,9 +172,9 @@ impl Windows {
 
     /// Bytes held.
     pub fn size(&self) -> usize {
-        let Sweep { changes, sides, .. } = &self.sweep;
+        let Sweep { depths, sides, .. } = &self.sweep;
         let rows = self.map.size() + self.held.size() + bytes(&self.swept);
-        changes.size() + sides.size() + rows
+        depths.size() + sides.size() + rows
     }
 }
 
@@ -208,7 +208,7 @@ struct WindowRows<'a> {
 /// What the sweeps need beside the map.
 #[derive(Debug, Default)]
 struct Sweep {
-    changes: DepthChanges,
+    depths: DepthRows,
     /// A row's, in lane order.
     sides: Buffer<Lanes>,
     /// Distances below this are those of the plain form; others are not below it.
@@ -256,7 +256,7 @@ impl<'a> WindowRows<'a> {
         let order = self.order;
         let mut before = rows.start;
         if rows.start == self.first {
-            sweep.changes.start(order.width);
+            sweep.depths.start(order.width);
             // This row is only tested against the first.
             before = before.saturating_sub(1);
         }
@@ -265,18 +265,18 @@ impl<'a> WindowRows<'a> {
         let factor = if factor.is_nan() { f32::INFINITY } else { factor };
         let far = far(points.width(), points.height());
         // SAFETY: as the caller's.
-        unsafe { sweep.changes.read::<S>(points, before) };
+        unsafe { sweep.depths.read::<S>(points, before) };
         for y in before..rows.end {
             if y + 1 < points.height() {
                 // SAFETY: as the caller's.
-                unsafe { sweep.changes.read::<S>(points, y + 1) };
+                unsafe { sweep.depths.read::<S>(points, y + 1) };
             } else {
                 // Of the last row no neighbours are tested; the row above was tested against it.
-                sweep.changes.stop();
+                sweep.depths.stop();
             }
             let row = &mut self.row(y.max(rows.start))[1..];
             // SAFETY: as the caller's.
-            let depths = unsafe { sweep.changes.find::<S::Pair>(points, y, factor, row) };
+            let depths = unsafe { sweep.depths.find_changes::<S::Pair>(points, y, factor, row) };
             swept[y] = Swept { depths, side: 0.0 };
             if y > self.first {
                 let (above, row) = self.two_rows(y - 1);
@@ -324,8 +324,8 @@ impl<'a> WindowRows<'a> {
                     let smoothing = if let Some(smoothing) = smoothing {
                         Smoothing::Alike(smoothing)
                     } else {
-                        sweep.changes.read::<S>(points, y);
-                        Smoothing::ByDepth(sweep.changes.depths(order, y))
+                        sweep.depths.read::<S>(points, y);
+                        Smoothing::ByDepth(sweep.depths.row(order, y))
                     };
                     let to = &mut sweep.sides;
                     swept[y].side = sides::<S::Pair>(points, options, y, smoothing, distances, to);

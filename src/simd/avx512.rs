@@ -82,7 +82,7 @@ impl Simd for Avx512 {
         unsafe { _mm256_castsi256_ps(_mm256_movm_epi32(bits as u8)) }
     }
     #[inline(always)]
-    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
+    unsafe fn select_bits_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
         unsafe { _mm256_mask_blend_epi32(lanes as u8, no, yes) }
     }
     #[inline(always)]
@@ -307,7 +307,7 @@ impl Simd for Avx512Pair {
         unsafe { _mm512_storeu_si512(to.cast(), value) }
     }
     #[inline(always)]
-    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
+    unsafe fn select_bits_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
         unsafe { _mm512_mask_blend_epi32(lanes as u16, no, yes) }
     }
 

@@ -95,7 +95,7 @@ pub(crate) trait Simd: Copy {
     unsafe fn add_i(a: Self::I, b: Self::I) -> Self::I;
     unsafe fn sub_i(a: Self::I, b: Self::I) -> Self::I;
     /// `lanes` bit l ? yes : no
-    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I;
+    unsafe fn select_bits_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I;
     /// Nearest integers, ties to even; the value must fit.
     unsafe fn round_i(a: Self::F) -> Self::I;
     /// Integers towards zero; of what does not fit, NaN too, any number.

@@ -146,7 +146,7 @@ impl Simd for Neon {
     }
 
     #[inline(always)]
-    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
+    unsafe fn select_bits_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
         unsafe { each!(2 vbslq_s32, lane_masks(lanes), yes, no) }
     }
 

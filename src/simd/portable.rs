@@ -194,7 +194,7 @@ impl Simd for Portable {
         zip(a, b, i32::wrapping_sub)
     }
     #[inline(always)]
-    unsafe fn select_i(lanes: u32, yes: I, no: I) -> I {
+    unsafe fn select_bits_i(lanes: u32, yes: I, no: I) -> I {
         select(lanes, yes, no)
     }
     #[inline(always)]

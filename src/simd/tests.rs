@@ -114,7 +114,7 @@ unsafe fn of_lanes<S: Simd>(a: &[f32; 16], b: &[f32; 16]) -> Results {
             j,
             S::add_i(i, j),
             S::sub_i(i, j),
-            S::select_i(bits, i, j),
+            S::select_bits_i(bits, i, j),
             S::load_i(loaded.as_ptr()),
         ]);
         results.floats::<S>([S::float_i(i)]);

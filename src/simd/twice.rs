@@ -108,10 +108,10 @@ impl<S: Simd> Simd for Twice<S> {
         unsafe { S::bits_lt_d(a[0], b[0]) | S::bits_lt_d(a[1], b[1]) << GROUP }
     }
     #[inline(always)]
-    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
+    unsafe fn select_bits_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
         let upper = lanes >> GROUP;
         // SAFETY: as the caller's.
-        unsafe { [S::select_i(lanes, yes[0], no[0]), S::select_i(upper, yes[1], no[1])] }
+        unsafe { [S::select_bits_i(lanes, yes[0], no[0]), S::select_bits_i(upper, yes[1], no[1])] }
     }
     #[inline(always)]
     unsafe fn select_bits_d(lanes: u32, yes: Self::D, no: Self::D) -> Self::D {

@@ -133,7 +133,7 @@ impl Simd for Sse2 {
     }
 
     #[inline(always)]
-    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
+    unsafe fn select_bits_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
         unsafe {
             let mask = Self::mask(lanes);
             let mask = [_mm_castps_si128(mask[0]), _mm_castps_si128(mask[1])];
@@ -366,7 +366,7 @@ impl Simd for Avx2 {
         unsafe { _mm256_storeu_si256(to.cast(), value) }
     }
     #[inline(always)]
-    unsafe fn select_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
+    unsafe fn select_bits_i(lanes: u32, yes: Self::I, no: Self::I) -> Self::I {
         unsafe { _mm256_blendv_epi8(no, yes, _mm256_castps_si256(Self::mask(lanes))) }
     }
 

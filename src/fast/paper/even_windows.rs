@@ -106,16 +106,16 @@ impl<S: Groups> Fits<S> {
     /// Takes the planes of others in some lanes.
     #[inline(always)]
     fn take(&mut self, lanes: u32, others: &Self) {
-        self.points.take(lanes, others.points);
+        self.points.take_lanes(lanes, others.points);
         for i in 0..3 {
-            self.q[i].take(lanes, others.q[i]);
-            self.ray[i].take(lanes, others.ray[i]);
+            self.q[i].take_lanes(lanes, others.q[i]);
+            self.ray[i].take_lanes(lanes, others.ray[i]);
         }
-        self.inverse_depth.take(lanes, others.inverse_depth);
-        self.unevenness.take(lanes, others.unevenness);
-        self.steepness_squared.take(lanes, others.steepness_squared);
+        self.inverse_depth.take_lanes(lanes, others.inverse_depth);
+        self.unevenness.take_lanes(lanes, others.unevenness);
+        self.steepness_squared.take_lanes(lanes, others.steepness_squared);
         for i in 0..6 {
-            self.covariance[i].take(lanes, others.covariance[i]);
+            self.covariance[i].take_lanes(lanes, others.covariance[i]);
         }
         self.turned = self.turned & !lanes | others.turned & lanes;
     }
@@ -445,7 +445,7 @@ impl EvenTile<'_> {
             let mut jagged = asked & clean.lt(wanted) & smallest.lt(wanted);
             let mut even = zero.lt(largest) & !jagged;
             let mut radii = largest;
-            radii.take(S::mask(jagged), wanted);
+            radii.take_lanes(jagged, wanted);
             let (mut found, mut bend2) = (zero, zero);
             let mut best = Fits::<S>::none();
             let (mut jagged_found, mut doubtful, mut hidden) = (0, 0, 0);
@@ -472,16 +472,16 @@ impl EvenTile<'_> {
                 if compared != 0 {
                     let in_relief = compared & fits.are_finer(&best, least, &of_image.noise);
                     is_enough = is_enough & !compared | compared & !in_relief;
-                    bend2.take(S::mask(in_relief), zero);
+                    bend2.take_lanes(in_relief, zero);
                 }
                 let is_better = even & fits.there & !is_enough;
                 let bends = even & fits.there & is_enough & !compared;
                 if bends != 0 {
                     let (side, of_half) = (found + found + one, radii + radii + one);
                     let sides2 = side * side - of_half * of_half;
-                    bend2.take(S::mask(bends), best.bend2(&fits, sides2, least, area));
+                    bend2.take_lanes(bends, best.bend2(&fits, sides2, least, area));
                 }
-                found.take(S::mask(is_jagged | is_better), radii);
+                found.take_lanes(is_jagged | is_better, radii);
                 best.take(is_jagged | is_better, &fits);
                 jagged_found |= is_jagged;
                 let seven_tenths = radii * Floats::splat(7.0) / Floats::splat(10.0);
@@ -492,9 +492,9 @@ impl EvenTile<'_> {
                 let tried = jagged & !is_jagged;
                 jagged = tried & clean.lt(next) & smallest.lt(next);
                 let starts = tried & !jagged & zero.lt(largest);
-                radii.take(S::mask(even), half);
-                radii.take(S::mask(jagged), next);
-                radii.take(S::mask(starts), largest);
+                radii.take_lanes(even, half);
+                radii.take_lanes(jagged, next);
+                radii.take_lanes(starts, largest);
                 even |= starts;
             }
             Found { best, radii: found, bend2, jagged: jagged_found, doubtful, hidden }
@@ -568,8 +568,8 @@ impl EvenTile<'_> {
             let deep = Doubles::splat(Plane::DEEP) * length2 * length2;
             let is_deep = deep.lt(along);
             let mut steepness_squared = slope2 * angle2;
-            unevenness.take(is_deep, Doubles::splat(f64::INFINITY));
-            steepness_squared.take(is_deep, Doubles::splat(0.0));
+            unevenness.take_lanes(is_deep, Doubles::splat(f64::INFINITY));
+            steepness_squared.take_lanes(is_deep, Doubles::splat(0.0));
             let rounded = !((along + of_trace).lt(deep) | (deep + of_trace).lt(along))
                 | !is_deep & !is_none & !of_deviation.lt(allowed)
                 | !is_deep & !((seen + of_seen).lt(line) | (line + enough_seen).lt(seen));
@@ -611,7 +611,7 @@ impl EvenTile<'_> {
             let most = Doubles::splat(JAGGED);
             let lines = Doubles::splat(JAGGED_LINES) * across.max(down).widen();
             let mut jagged = fits.points / lines;
-            jagged.take(most.lt(jagged), most);
+            jagged.take_lanes(most.lt(jagged), most);
             let steep = jagged * jagged * fits.steepness_squared;
             let fewest = Doubles::splat(JAGGED_POINTS) * (across * down).widen();
             let least = Doubles::splat(self.even.asked.noise.least.into());
