@@ -10,7 +10,7 @@ use crate::Error;
 use crate::cloud::Points;
 use crate::simd::{Along, GROUP, Simd};
 
-/// Columns before and after a row's own, so that groups and the column before the first need no special case.
+/// Columns before and after a row's own, so that groups and the pixels next to them need no special case.
 pub(crate) const MARGIN: usize = GROUP;
 
 /// Where the rows and columns of a tile lie in its rings.

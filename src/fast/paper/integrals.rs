@@ -10,6 +10,7 @@ use crate::fast::arithmetic::{Doubles, Floats};
 use crate::fast::buffer::Buffer;
 use crate::fast::lanes::LANES;
 use crate::fast::moments::push_eight;
+use crate::fast::planes::MARGIN;
 use crate::simd::{Along, GROUP, Groups};
 
 /// x, y, z, and the weight: 1, or next to nothing for a hidden point (`layers`); 0 for a missing one, whose coordinates are
@@ -18,9 +19,6 @@ pub(crate) type Counted = [f32; 4];
 
 /// Number of the weights' plane.
 pub(crate) const WEIGHT: usize = 3;
-
-/// Columns before and after a row's own, so that the pixels next to a group need no special case.
-pub(crate) const MARGIN: usize = GROUP;
 
 /// What is summed: `N` channels of a pixel.
 pub(crate) trait Channels<const N: usize> {

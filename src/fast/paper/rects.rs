@@ -2,8 +2,9 @@
 
 use std::hint::black_box;
 
-use super::integrals::{Aimed, MARGIN, Rings};
+use super::integrals::{Aimed, Rings};
 use crate::fast::arithmetic::{Doubles, Floats, between};
+use crate::fast::planes::MARGIN;
 use crate::simd::{GROUP, Groups};
 
 /// The rows of the windows of a radius around a row's pixels, inside the image.
