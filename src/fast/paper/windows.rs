@@ -112,7 +112,7 @@ impl Sweep {
         // SAFETY: as the caller's.
         unsafe {
             self.down::<S>(rows, options);
-            self.up::<S>(rows, options, margin)
+            self.up::<S>(rows, options)
         }
     }
 
@@ -197,13 +197,8 @@ impl Sweep {
     /// # Safety
     /// As [`Sweep::radii`].
     #[inline(always)]
-    unsafe fn up<S: Simd>(
-        &mut self,
-        rows: &mut Rows,
-        options: &PaperOptions,
-        margin: usize,
-    ) -> f32 {
-        let length = row_length(rows.width);
+    unsafe fn up<S: Simd>(&mut self, rows: &mut Rows, options: &PaperOptions) -> f32 {
+        let (length, margin) = (row_length(rows.width), margin(options));
         let inside = length - LANES;
         let Sweep { below, squares, least, along, .. } = self;
         let (below, along) = (&mut below[..length], &along[..margin]);
