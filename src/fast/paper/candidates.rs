@@ -283,7 +283,7 @@ impl<'a, S: Along> Candidates<'a, S> {
         unsafe {
             let alike = Floats::splat(ALIKE);
             let mut least = Floats::<S>::splat(f32::INFINITY);
-            let mut best = S::splat(-1.0);
+            let mut best = Floats::splat(-1.0);
             let mut windows = Windows::none();
             for (number, candidates) in found.iter_mut().enumerate() {
                 let these = Windows::load(&candidates.windows);
@@ -292,8 +292,8 @@ impl<'a, S: Along> Candidates<'a, S> {
                 let better = S::lt(cost.0, least.0);
                 // Mostly none is.
                 if S::bits(better) != 0 {
-                    least.0 = S::select(better, (alike * cost).0, least.0);
-                    best = S::select(better, S::splat(number as f32), best);
+                    least.take(better, alike * cost);
+                    best.take(better, Floats::splat(number as f32));
                     windows.take(better, &these);
                 }
             }
@@ -309,12 +309,12 @@ impl<'a, S: Along> Candidates<'a, S> {
                 let better = S::and(is_better, on_first_side);
                 // Mostly none is.
                 if S::bits(better) != 0 {
-                    least.0 = S::select(better, (alike * cost).0, least.0);
-                    best = S::select(better, S::splat(number as f32), best);
+                    least.take(better, alike * cost);
+                    best.take(better, Floats::splat(number as f32));
                     windows.take(better, &these);
                 }
             }
-            (Floats(best), windows)
+            (best, windows)
         }
     }
 }
