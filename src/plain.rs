@@ -27,10 +27,9 @@ pub(crate) struct Plain<'a> {
 
 impl<'a> Plain<'a> {
     pub fn new(points: &'a Points, options: &'a Options) -> Result<Self, Error> {
-        let (width, height) = (points.width(), points.height());
+        let image = Image::of(points, options);
         let depth_changes = depth_change_map(points, options.max_depth_change_factor)?;
-        let distances = distance_map(&depth_changes, width, height)?;
-        let image = Image { width, height, border_policy: options.border_policy };
+        let distances = distance_map(&depth_changes, image.width, image.height)?;
         Ok(Plain { points, options, image, depth_changes, distances })
     }
 
@@ -72,8 +71,7 @@ pub(crate) fn of_window(
 ) -> Estimate {
     match options.semantics {
         Semantics::Pcl => {
-            let (width, height) = (points.width(), points.height());
-            let image = Image { width, height, border_policy: options.border_policy };
+            let image = Image::of(points, options);
             estimate_window(options.method, points, &image, pixel, size)
         }
         Semantics::Paper => paper::estimate_window(points, options, pixel, size),

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use crate::options::BorderPolicy;
+use crate::cloud::Points;
+use crate::options::{BorderPolicy, Options};
 use crate::rect::Rect;
 
 /// The image's size and what windows do at its border.
@@ -14,6 +15,12 @@ pub(crate) struct Image {
 }
 
 impl Image {
+    pub fn of(points: &Points, options: &Options) -> Self {
+        let (width, height, border_policy) =
+            (points.width(), points.height(), options.border_policy);
+        Image { width, height, border_policy }
+    }
+
     /// The rectangles that make up a window which may cross the border, none empty, with their signs; a pixel in two of them
     /// counts twice, and one in a rectangle of sign -1 is taken away: mirroring does so to windows that start outside the
     /// image.

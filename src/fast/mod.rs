@@ -358,11 +358,11 @@ struct Strip {
 impl<'a> PclJob<'a> {
     fn new(job: Job<'a>) -> Self {
         let Job { points, options, .. } = job;
-        let (width, height) = (points.width(), points.height());
-        let image = Image { width, height, border_policy: options.border_policy };
+        let image = Image::of(points, options);
         let is_depth = options.method == Method::AverageDepthChange;
         let spacing = if is_depth { spacing(points) } else { 0.0 };
-        PclJob { job, image, spacing, strips: strips(width, height) }
+        let strips = strips(image.width, image.height);
+        PclJob { job, image, spacing, strips }
     }
 
     /// Where a strip starts: strips are of like heights.
