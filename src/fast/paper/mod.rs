@@ -159,7 +159,7 @@ pub(crate) fn compute(
 ) -> Result<(), Error> {
     job.depths(scratch)?;
     job.radii(scratch)?;
-    job.tiles(scratch, output, None)
+    job.tiles(scratch, output, false)
 }
 
 /// Finds the pixels that take no even window but have one of their own.
@@ -193,10 +193,7 @@ pub(crate) fn compute_left(
     output: Output,
     scratch: &mut super::Scratch,
 ) -> Result<(), Error> {
-    let left = std::mem::take(&mut scratch.paper.left);
-    let done = job.tiles(scratch, output, Some(&left));
-    scratch.paper.left = left;
-    done
+    job.tiles(scratch, output, true)
 }
 
 /// Writes the normals of the pixels that take even windows, and none for those that have no window; if their points are given,
@@ -372,17 +369,18 @@ impl Job<'_> {
         (&depths[y * length..][..length], &radii[place * length..][..length])
     }
 
-    /// The normals, tile by tile, of all pixels, or of those that are left.
+    /// The normals, tile by tile, of all pixels, or of those only that are left.
     #[inline(never)]
     fn tiles(
         &self,
         scratch: &mut super::Scratch,
         output: Output,
-        left: Option<&Marks>,
+        only_left: bool,
     ) -> Result<(), Error> {
         let &Job { points, options, .. } = self;
         let super::Scratch { workers, each, listed, paper, .. } = scratch;
         let (width, height, largest) = (points.width(), points.height(), paper.largest);
+        let left = only_left.then_some(&paper.left);
         let sink = Sink::new(output, width, listed)?;
         let row = &|y: usize| self.row(paper, y);
         let column = column(options.method);
