@@ -34,9 +34,10 @@ impl Cloud {
     /// Becomes another cloud.
     pub fn read(&mut self, points: &Points, options: &Options) -> Result<(), Error> {
         self.resize(points, options)?;
-        let (width, range) = (self.width, self.has_range);
+        let (width, has_range) = (self.width, self.has_range);
         let cleaned = Cleaned::new(points, options);
-        let depth = |[x, y, z]: [f32; 3]| if range { (x * x + y * y + z * z).sqrt() } else { z };
+        let depth =
+            |[x, y, z]: [f32; 3]| if has_range { (x * x + y * y + z * z).sqrt() } else { z };
         let rows = self.points.chunks_mut(width).zip(self.depths.chunks_mut(width)).enumerate();
         for (y, (points, depths)) in rows {
             for (x, (to, of_to)) in points.iter_mut().zip(depths).enumerate() {

@@ -25,7 +25,7 @@ pub(crate) unsafe fn read<S: Along>(
     depths: &mut [f32],
 ) -> [f32; 2] {
     let width = points.width();
-    let range = options.paper.depth == Depth::Range;
+    let has_range = options.paper.depth == Depth::Range;
     let depths = &mut depths[..row_length(width)];
     let points = points.row(y, 0..width);
     // SAFETY: as the caller's; all lanes lie inside the depths.
@@ -33,7 +33,7 @@ pub(crate) unsafe fn read<S: Along>(
         for x in points.starts::<S>() {
             let point = points.lanes::<S>(x);
             let (none, there) = (S::splat(f32::NAN), there::<S>(point, options));
-            let depth = S::select(there, depth::<S>(point, range), none);
+            let depth = S::select(there, depth::<S>(point, has_range), none);
             S::store(depths.as_mut_ptr().add(x), depth);
         }
         depths[width..].fill(f32::NAN);
@@ -78,7 +78,7 @@ pub(crate) struct PointRows<'a> {
     pub columns: &'a mut [f32],
     pub options: &'a Options,
     /// Whether depths are distances from the origin.
-    pub range: bool,
+    pub has_range: bool,
 }
 
 /// What [`PointRows::columns`] holds for blocks of this number.
@@ -102,13 +102,13 @@ impl PointRows<'_> {
     /// The processor has the instruction set of `S`.
     #[inline(always)]
     unsafe fn read<S: Along>(self) {
-        let PointRows { rows, sums, columns, options, range } = self;
+        let PointRows { rows, sums, columns, options, has_range } = self;
         let columns = &mut columns[..room_for_columns(sums.len())];
         let plane = columns.len() / 4;
         columns.fill(0.0);
         for OneRow { from, points, depths, padded } in rows {
             // SAFETY: as the caller's.
-            unsafe { read_points::<S>(&from, options, range, points, depths, columns) };
+            unsafe { read_points::<S>(&from, options, has_range, points, depths, columns) };
             if let Some((padded, range)) = padded {
                 padded[..depths.len()].copy_from_slice(depths);
                 padded[depths.len()..].fill(f32::NAN);
@@ -143,7 +143,7 @@ impl PointRows<'_> {
 unsafe fn read_points<S: Along>(
     row: &PointRow,
     options: &Options,
-    range: bool,
+    has_range: bool,
     to: &mut [[f32; 3]],
     depths: &mut [f32],
     columns: &mut [f32],
@@ -159,7 +159,7 @@ unsafe fn read_points<S: Along>(
         unsafe {
             let point = row.lanes::<S>(x);
             let (none, there) = (S::splat(f32::NAN), there::<S>(point, options));
-            let depth = S::select(there, depth::<S>(point, range), none);
+            let depth = S::select(there, depth::<S>(point, has_range), none);
             let mut fields = [depth; 4];
             if are_summed {
                 let [px, py, pz] = point;
@@ -210,9 +210,13 @@ unsafe fn there<S: Along>([x, y, z]: [S::F; 3], options: &Options) -> S::F {
 /// # Safety
 /// The processor has the instruction set of `S`.
 #[inline(always)]
-unsafe fn depth<S: Along>([x, y, z]: [S::F; 3], range: bool) -> S::F {
+unsafe fn depth<S: Along>([x, y, z]: [S::F; 3], has_range: bool) -> S::F {
     // SAFETY: as the caller's.
     unsafe {
-        if range { S::sqrt(S::add(S::add(S::mul(x, x), S::mul(y, y)), S::mul(z, z))) } else { z }
+        if has_range {
+            S::sqrt(S::add(S::add(S::mul(x, x), S::mul(y, y)), S::mul(z, z)))
+        } else {
+            z
+        }
     }
 }

@@ -246,7 +246,7 @@ pub(crate) fn read_cloud(
                 let from = points.row(row * BLOCK + line, 0..width);
                 OneRow { from, points: to, depths, padded }
             });
-            let rows = PointRows { rows: &mut rows, sums, columns, options, range: has_range };
+            let rows = PointRows { rows: &mut rows, sums, columns, options, has_range };
             // SAFETY: the processor has the instruction set.
             unsafe { paths::run(isa, rows) };
         }
