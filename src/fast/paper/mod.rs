@@ -456,9 +456,9 @@ impl Job<'_> {
         }
     }
 
-    /// The even windows and their estimates, and if they are asked for pixels' `own` normals by CM but those of the pixels that
-    /// are marked, tile by tile; the even windows' radii are not above `largest`. The depths have been read, and the pixels' own windows are those that
-    /// [`Job::radii`] has found.
+    /// The even windows and their estimates, and if they are asked for pixels' `own` normals by CM, but those of the marked
+    /// ones, tile by tile; the even windows' radii are not above `largest`. The depths have been read, and the pixels' own
+    /// windows are those that [`Job::radii`] has found.
     #[inline(never)]
     fn even_tiles(
         &self,
