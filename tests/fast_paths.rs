@@ -477,6 +477,27 @@ fn points_on_opposite_sides_equal_the_plain_form() {
     }
 }
 
+/// Depths in a smaller unit than x and y: windows are nearly lines, whose two smaller eigenvalues floats do not tell apart.
+#[test]
+fn depths_in_another_unit_equal_the_plain_form() {
+    let mut worst = Worst::default();
+    for (seed, kind) in (0..).zip(Kind::ALL) {
+        for units in [10.0, 100.0, 1000.0, 1e5] {
+            let mut cloud = Cloud::new(kind, 70, 50, seed);
+            cloud.points.iter_mut().for_each(|point| point[2] *= units);
+            let what = format!("{kind:?}, {units} units a metre");
+            for method in methods() {
+                worst.check(&cloud, &what, &options(method, 10.0, true));
+            }
+            for mut options in paper_options() {
+                options.paper.alpha /= units;
+                options.paper.beta /= units;
+                worst.check(&cloud, &what, &options);
+            }
+        }
+    }
+}
+
 /// No depth change map tells whether the last point of all belongs to those next to it.
 #[test]
 fn a_last_point_apart_equals_the_plain_form() {

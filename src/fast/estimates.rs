@@ -12,6 +12,8 @@ pub(crate) struct Found<S: Simd> {
     pub curvature: Floats<S>,
     /// The lanes whose sums are too near to the rounding of the rings: the plain form decides.
     pub doubtful: u32,
+    /// Those of them whose sums are not: what is found from them in fewer digits is.
+    pub imprecise: u32,
 }
 
 impl<S: Simd> Found<S> {
@@ -54,7 +56,7 @@ impl<S: Simd> Found<S> {
             let [x, y, z] = &estimates.normal;
             let normal = [of_lanes(x), of_lanes(y), of_lanes(z)];
             let curvature = of_lanes(&estimates.curvature);
-            self.take(lanes & !left, &Found { normal, curvature, doubtful: 0 });
+            self.take(lanes & !left, &Found { normal, curvature, doubtful: 0, imprecise: 0 });
         }
         left
     }

@@ -288,7 +288,7 @@ impl<T: DepthSum> Sums for HalfWindows<T> {
         run: &OfRun<f32, 6>,
         at: usize,
         sides: S::F,
-        _fresh: bool,
+        _error: f64,
     ) -> Found<S> {
         // SAFETY: as the caller's.
         unsafe {
@@ -321,6 +321,7 @@ impl<T: DepthSum> Sums for HalfWindows<T> {
                 normal: [n[0] * scale, n[1] * scale, n[2] * scale],
                 curvature: Floats::splat(f32::NAN),
                 doubtful: !sure,
+                imprecise: 0,
             }
         }
     }

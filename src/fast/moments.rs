@@ -302,15 +302,19 @@ impl Sums for Moments {
         plain
     }
 
+    fn error(&self) -> f64 {
+        self.error
+    }
+
     #[inline(always)]
     unsafe fn estimate<S: Simd>(
         &self,
         run: &Matrices,
         at: usize,
         _sides: S::F,
-        fresh: bool,
+        error: f64,
     ) -> Found<S> {
         // SAFETY: as the caller's.
-        unsafe { run.normals(at, if fresh { 0.0 } else { self.error }) }
+        unsafe { run.normals(at, error) }
     }
 }

@@ -90,7 +90,8 @@ impl<M: Sums> Row<'_, M> {
             for number in 0..run.length {
                 let (x, windows, written) = run.places[number];
                 let sides = S::Pair::load(row.as_ptr().add(x));
-                let found = sums.estimate::<S::Pair>(&run.sums, number * LANES, sides, false);
+                let found =
+                    sums.estimate::<S::Pair>(&run.sums, number * LANES, sides, sums.error());
                 rest[number] = windows & !(run.lanes[number] & !found.doubtful);
                 any_rest |= rest[number];
                 let normals = self.turned::<S>(found, x, windows, points);
@@ -119,24 +120,28 @@ impl<M: Sums> Row<'_, M> {
         let ((x, ..), lanes, at) = (places[number], lanes[number], number * LANES);
         let row = tile.sides.row(y);
         let window = |lane: usize| ((x + lane, y), row[x + lane] as usize);
+        let error = sums.error();
         // SAFETY: as the caller's.
         unsafe {
             let sides = S::Pair::load(row.as_ptr().add(x));
-            let mut found = sums.estimate::<S::Pair>(of_run, at, sides, false);
+            let mut found = sums.estimate::<S::Pair>(of_run, at, sides, error);
             let (mut doubtful, mut of_one) = (rest & lanes, 0);
             if doubtful != 0 {
                 let around = |lane: usize| (window(lane).0, tile.around(window(lane)));
                 of_one = of_one_point::<S::Widest>(tile.points, doubtful, around);
                 doubtful &= !of_one;
             }
+            let imprecise = doubtful & found.imprecise;
+            doubtful &= !imprecise;
+            doubtful |= found.take_precise(imprecise, |lane| of_run.precisely(at + lane, error));
             if doubtful != 0 {
                 let points = |lane: usize| tile.points_in(window(lane));
                 if of_run.afresh::<S, _>(at, doubtful, points) {
-                    let fresh = sums.estimate::<S::Pair>(of_run, at, sides, true);
+                    let fresh = sums.estimate::<S::Pair>(of_run, at, sides, 0.0);
                     doubtful = found.take_certain(doubtful, &fresh);
                 }
                 doubtful = found.take_precise(doubtful, |lane| {
-                    let precise = of_run.precisely(at + lane);
+                    let precise = of_run.precisely(at + lane, 0.0);
                     precise.or_else(|| sums.precisely(tile, window(lane)))
                 });
             }

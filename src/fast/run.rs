@@ -147,9 +147,9 @@ pub(crate) trait Noted: Default {
         false
     }
 
-    /// The estimate of the pixel that is `at`, where it is doubtful even after [`Noted::afresh`]; none if it is left to the
-    /// plain form.
-    fn precisely(&self, _at: usize) -> Option<Estimate> {
+    /// The estimate of the pixel that is `at`, from sums whose rounding errors stay below `error`: 0 where they are those of
+    /// [`Noted::afresh`]; none if it is doubtful even so.
+    fn precisely(&self, _at: usize, _error: f64) -> Option<Estimate> {
         None
     }
 }

@@ -210,7 +210,7 @@ impl Sums for Strips {
         run: &Gradients,
         at: usize,
         sides: S::F,
-        _fresh: bool,
+        _error: f64,
     ) -> Found<S> {
         // SAFETY: as the caller's.
         unsafe { run.normals(&self.scale, at, sides) }

@@ -85,14 +85,19 @@ pub(crate) trait Sums {
         at: usize,
     ) -> u32;
 
+    /// What the rounding errors of the rings' sums stay below, if [`Sums::estimate`] is to be told.
+    fn error(&self) -> f64 {
+        0.0
+    }
+
     /// The estimate of a pixel that is doubtful, where its run has none; none if it is left to the plain form. `window` is the
     /// pixel and the side of its window.
     fn precisely(&self, _tile: &Tile, _window: ((usize, usize), usize)) -> Option<Estimate> {
         None
     }
 
-    /// The estimates of the pixels from `at` on in a run, which are solved; `sides` are those of their windows. Whether
-    /// their sums are from [`Noted::afresh`], `fresh` tells.
+    /// The estimates of the pixels from `at` on in a run, which are solved; `sides` are those of their windows. The
+    /// rounding errors of their sums stay below `error`: [`Sums::error`], or 0 after [`Noted::afresh`].
     ///
     /// # Safety
     /// As [`Sums::push`].
@@ -101,7 +106,7 @@ pub(crate) trait Sums {
         run: &Self::OfRun,
         at: usize,
         sides: S::F,
-        fresh: bool,
+        error: f64,
     ) -> Found<S>;
 }
 

@@ -316,13 +316,15 @@ impl Tile<'_> {
             let around = |lane: usize| (pixel(lane), rect(lane));
             let windows = doubtful & !of_one_point::<S::Widest>(self.points, doubtful, around);
             let mut found = M::estimate::<S::Pair>(sums, at, error);
-            let mut plain = windows;
+            let imprecise = windows & found.imprecise & !few[pair];
+            let mut plain = windows & !imprecise;
+            plain |= found.take_precise(imprecise, |lane| sums.precisely(at + lane, error));
             if plain != 0 {
                 let points = |lane: usize| cleaned.finite(rect(lane));
                 if sums.afresh::<S, _>(at, plain, points) {
                     plain = found.take_certain(plain, &M::estimate::<S::Pair>(sums, at, 0.0));
                 }
-                plain = found.take_precise(plain, |lane| sums.precisely(at + lane));
+                plain = found.take_precise(plain, |lane| sums.precisely(at + lane, 0.0));
                 plain |= few[pair] & windows;
             }
             let here = points.load::<S::Pair>(at);
