@@ -5,9 +5,11 @@ use crate::cloud::{Normals, Points};
 use crate::fast::arithmetic::Floats;
 use crate::fast::estimates::turned;
 use crate::fast::lanes::{Bits, LANES, all};
+use crate::fast::one_point::of_one_point;
 use crate::fast::paths::Task;
 use crate::options::Options;
 use crate::paper::{Cloud, NO_WINDOW, SecondPass};
+use crate::rect::Rect;
 use crate::simd::{Along, Groups, load_by_fours};
 
 /// A row of pixels, some of which take even windows.
@@ -42,7 +44,7 @@ impl ChosenRow<'_> {
     #[inline(always)]
     unsafe fn write<S: Along>(&self) {
         let &ChosenRow { cloud, options, second_pass, y, sizes, of_left, .. } = self;
-        let first = y * cloud.width;
+        let (first, size) = (y * cloud.width, (cloud.width, cloud.height));
         let choices = &second_pass.choices()[first..][..cloud.width];
         const { assert!(f32::from_bits(NO_WINDOW).is_nan()) };
         let whole = cloud.width / S::LANES * S::LANES;
@@ -64,6 +66,17 @@ impl ChosenRow<'_> {
                 without =
                     unsafe { S::bits(S::eq(S::splat(0.0), S::load(sizes.as_ptr()))) } & others;
                 left = others & !without;
+                if let Some(points) = of_left
+                    && left != 0
+                {
+                    let pixel = |lane: usize| (x + lane, y);
+                    let around = |lane: usize| {
+                        (pixel(lane), Rect::around(pixel(lane), sizes[lane] as usize, size))
+                    };
+                    // SAFETY: as the caller's; windows are inside the image.
+                    without |= unsafe { of_one_point::<S>(points, left, around) };
+                    left &= !without;
+                }
             }
             let written = lanes | without;
             if written != 0 {
