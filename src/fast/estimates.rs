@@ -12,7 +12,7 @@ pub(crate) struct Found<S: Simd> {
     pub curvature: Floats<S>,
     /// The lanes whose sums are too near to the rounding of the rings: the plain form decides.
     pub doubtful: u32,
-    /// Those of them whose sums are not: what is found from them in fewer digits is.
+    /// Those of them whose sums are exact enough: doubles may decide from these.
     pub imprecise: u32,
 }
 

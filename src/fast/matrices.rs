@@ -69,7 +69,7 @@ const DOUBT_SUMS: f64 = 3e4;
 /// normal by less than 1e-5: in sums over hundreds of points it is about four times [`ROUNDING`].
 const LEAST_GAP: f64 = 1e5 * 4.0 * ROUNDING;
 
-/// The least such distance that rounding errors of sums must allow for, or else the sums are doubtful.
+/// Where the sums' rounding errors ask for a larger distance than this, they are not looked at in doubles.
 const GAP: f32 = 1e-6;
 
 /// The least product of the smallest eigenvalue's distances from the others (of a matrix of trace 1): the rounding of
