@@ -74,12 +74,9 @@ fn scenes((semantics, method, policy, ..): Case) -> Vec<Scene> {
     };
     let far = Scene { name: ", far away, one x missing", percent: 125, moved: 1000.0, ..usual };
     let mut scenes = vec![usual, far];
-    if semantics == Pcl || method == CovarianceMatrix {
-        let name = ", with a far plane";
-        let percent = if semantics == Pcl { 300 } else { 480 };
-        scenes.push(Scene { name, percent, plane: 65504.0, ..usual });
-    }
+    let far_plane = Scene { name: ", with a far plane", percent: 300, plane: 65504.0, ..usual };
     if semantics == Pcl {
+        scenes.push(far_plane);
         // Windows at the border with missing points are walked over, and mirrored ones are the largest.
         let percent = if (method, policy) == (Average3DGradient, Mirror) { 800 } else { 400 };
         scenes.push(Scene { name: ", in millimetres", percent, units: 1000.0, ..usual });
@@ -88,6 +85,7 @@ fn scenes((semantics, method, policy, ..): Case) -> Vec<Scene> {
     let name = ", with a second pass and zeros";
     match (semantics, method, policy) {
         (Paper, CovarianceMatrix, _) => scenes.extend([
+            Scene { percent: 480, ..far_plane },
             Scene { percent: 230, ..second_pass },
             Scene { name, percent: 320, plane: 0.0, ..second_pass },
         ]),

@@ -12,8 +12,6 @@ pub(crate) struct Found<S: Simd> {
     pub curvature: Floats<S>,
     /// The lanes whose sums are too near to the rounding of the rings: the plain form decides.
     pub doubtful: u32,
-    /// Those of them whose sums are exact enough: doubles may decide from these.
-    pub imprecise: u32,
 }
 
 impl<S: Simd> Found<S> {
@@ -56,7 +54,7 @@ impl<S: Simd> Found<S> {
             let [x, y, z] = &estimates.normal;
             let normal = [of_lanes(x), of_lanes(y), of_lanes(z)];
             let curvature = of_lanes(&estimates.curvature);
-            self.take(lanes & !left, &Found { normal, curvature, doubtful: 0, imprecise: 0 });
+            self.take(lanes & !left, &Found { normal, curvature, doubtful: 0 });
         }
         left
     }

@@ -243,7 +243,6 @@ impl Scale {
                 normal: [n[0] * scale, n[1] * scale, n[2] * scale],
                 curvature: Floats::splat(f32::NAN),
                 doubtful: !rounding.max(sine).lt(n2),
-                imprecise: 0,
             }
         }
     }

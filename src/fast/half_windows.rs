@@ -321,7 +321,6 @@ impl<T: DepthSum> Sums for HalfWindows<T> {
                 normal: [n[0] * scale, n[1] * scale, n[2] * scale],
                 curvature: Floats::splat(f32::NAN),
                 doubtful: !sure,
-                imprecise: 0,
             }
         }
     }

@@ -69,8 +69,8 @@ const DOUBT_SUMS: f64 = 3e4;
 /// normal by less than 1e-5: in sums over hundreds of points it is about four times [`ROUNDING`].
 const LEAST_GAP: f64 = 1e5 * 4.0 * ROUNDING;
 
-/// Where the sums' rounding errors ask for a larger distance than this, they are not looked at in doubles.
-const GAP: f32 = 1e-6;
+/// Where the sums' rounding errors ask for a larger distance than this, it is not worth looking for.
+const GAP: f64 = 1e-6;
 
 /// The least product of the smallest eigenvalue's distances from the others (of a matrix of trace 1): the rounding of
 /// the determinant, some 1e-16, over its square turns the normal.
@@ -149,13 +149,17 @@ impl Noted for Matrices {
     /// In doubles, from the matrix; none if rounding leaves it doubtful.
     #[cold]
     fn precisely(&self, at: usize, error: f64) -> Option<Estimate> {
-        let [xx, xy, xz, yy, yz, zz] = self.elements.of_one(at);
-        let (values, vector) = eigen(&Symmetric3 { xx, xy, xz, yy, yz, zz });
         // The matrix is over its trace, which may be rounding alone.
         let [trace] = self.trace.of_one(at);
+        let asked = DOUBT_SUMS * error / f64::from(trace);
+        let is_worth_it = trace > 0.0 && asked < GAP;
+        if !is_worth_it {
+            return None;
+        }
+        let [xx, xy, xz, yy, yz, zz] = self.elements.of_one(at);
+        let (values, vector) = eigen(&Symmetric3 { xx, xy, xz, yy, yz, zz });
         let curvature = (values[0] / (xx + yy + zz)) as f32;
-        let least = LEAST_GAP.max(DOUBT_SUMS * error / f64::from(trace));
-        (trace > 0.0 && least < values[1] - values[0])
+        (LEAST_GAP.max(asked) < values[1] - values[0])
             .then(|| Estimate { normal: vector.map(|c| c as f32), curvature })
     }
 }
@@ -266,14 +270,13 @@ impl Matrices {
             let is_smallest = value.lt(Floats::splat(1.0 / 3.0));
             // Rounding alone may give any slope, but no trace.
             let sums = least.lt(slope * trace) & least.lt(trace);
+            let sure = Floats::splat(DOUBT_PLANE).lt(slope) & sums & is_smallest;
             // Of the pair's groups, these pixels'.
             let unsettled = self.unsettled[at / LANES] >> (at % LANES);
-            let sure = Floats::splat(DOUBT_PLANE).lt(slope) & sums & is_smallest & !unsettled;
             Found {
                 normal: [n[0] * scale, n[1] * scale, n[2] * scale],
                 curvature: value,
-                doubtful: !sure,
-                imprecise: !sure & least.lt(Floats::splat(GAP) * trace),
+                doubtful: !sure | unsettled,
             }
         }
     }

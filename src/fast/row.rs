@@ -131,9 +131,7 @@ impl<M: Sums> Row<'_, M> {
                 of_one = of_one_point::<S::Widest>(tile.points, doubtful, around);
                 doubtful &= !of_one;
             }
-            let imprecise = doubtful & found.imprecise;
-            doubtful &= !imprecise;
-            doubtful |= found.take_precise(imprecise, |lane| of_run.precisely(at + lane, error));
+            doubtful = found.take_precise(doubtful, |lane| of_run.precisely(at + lane, error));
             if doubtful != 0 {
                 let points = |lane: usize| tile.points_in(window(lane));
                 if of_run.afresh::<S, _>(at, doubtful, points) {

@@ -66,6 +66,7 @@ impl ChosenRow<'_> {
                 without =
                     unsafe { S::bits(S::eq(S::splat(0.0), S::load(sizes.as_ptr()))) } & others;
                 left = others & !without;
+                // Windows of one point may be those of a whole image.
                 if let Some(points) = of_left
                     && left != 0
                 {

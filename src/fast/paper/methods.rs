@@ -345,6 +345,6 @@ unsafe fn across<S: Simd>(run: &OfRun<f32, 6>, at: usize, error: f64) -> Found<S
         for c in 0..3 {
             normal[c].take(both, n[c] * scale);
         }
-        Found { normal, curvature: none, doubtful: S::bits(both) & !sure, imprecise: 0 }
+        Found { normal, curvature: none, doubtful: S::bits(both) & !sure }
     }
 }

@@ -316,17 +316,17 @@ impl Tile<'_> {
             let around = |lane: usize| (pixel(lane), rect(lane));
             let windows = doubtful & !of_one_point::<S::Widest>(self.points, doubtful, around);
             let mut found = M::estimate::<S::Pair>(sums, at, error);
-            let imprecise = windows & found.imprecise & !few[pair];
-            let mut plain = windows & !imprecise;
-            plain |= found.take_precise(imprecise, |lane| sums.precisely(at + lane, error));
+            let few = windows & few[pair];
+            let precisely = |lane: usize| sums.precisely(at + lane, error);
+            let mut plain = found.take_precise(windows & !few, precisely);
             if plain != 0 {
                 let points = |lane: usize| cleaned.finite(rect(lane));
                 if sums.afresh::<S, _>(at, plain, points) {
                     plain = found.take_certain(plain, &M::estimate::<S::Pair>(sums, at, 0.0));
                 }
                 plain = found.take_precise(plain, |lane| sums.precisely(at + lane, 0.0));
-                plain |= few[pair] & windows;
             }
+            plain |= few;
             let here = points.load::<S::Pair>(at);
             let mut normals = Estimates::of(found, here, self.options.viewpoint, windows & !plain);
             for lane in Bits(plain) {
